@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import shlex
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 from math import degrees, isfinite, radians
 from pathlib import Path
@@ -730,12 +730,13 @@ def bode(
     linear: LinearModel | None = None
     with spinner("Sweeping"):
         if machine.own is not None:
+            others = machine.own.constants("--at", at or ())
             response, linear = _own_response(
                 machine.own,
                 grid,
                 Sine(amplitudes or [1.0], bias, linear_at),
-                _ends(machine.own, input, output),
-                machine.own.constants("--at", at or ()),
+                _ends(machine.own, input, output, others),
+                others,
                 machine.own.steps_a_second(rate),
             )
             table = response.table()
@@ -767,9 +768,11 @@ class Sine(NamedTuple):
     """Where the linear model is taken; None for no such model."""
 
 
-def _ends(own: OwnMachine, input: str | None, output: str | None) -> tuple[str, str]:
-    """Input and output of a frequency response, by their full names."""
-    moved = own.driven if input is None else own.input_named(input)
+def _ends(
+    own: OwnMachine, input: str | None, output: str | None, given: Collection[str]
+) -> tuple[str, str]:
+    """Input and output of a frequency response, by their full names; others are given."""
+    moved = own.driven(given) if input is None else own.input_named(input)
     named = outputs_named(own, None if output is None else [output])
     usual = [name for name in own.model.outputs if name not in own.model.integrals]
     return moved, (named or usual or own.model.last_signals)[0]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple, get_type_hints
@@ -68,13 +68,12 @@ class OwnMachine:
         defaults = {part.tap(name).signal for part in model.parts for name in part.defaults}
         return tuple(name for name in model.external if name not in defaults)
 
-    @property
-    def driven(self) -> str:
-        """Its first input, which drives it if none is named."""
+    def driven(self, given: Collection[str] = ()) -> str:
+        """Its first input that is not given otherwise, which drives it if none is named."""
         inputs = self.needed or self.model.external
         if not inputs:
             raise InputError(f"{self.title}: the equations of {self.machine.name} take no input.")
-        return inputs[0]
+        return next((name for name in inputs if name not in given), inputs[0])
 
     def named(self, name: str, names: Sequence[str], what: str) -> str:
         """The full name of an input, an output or a signal; a wrong one is refused."""
@@ -101,7 +100,7 @@ class OwnMachine:
 
     def constants(self, option: str, assignments: Sequence[str]) -> dict[str, float]:
         """Constant inputs of assignments such as ``supply=100``; a number alone is the first."""
-        written = [each if "=" in each else f"{self.driven}={each}" for each in assignments]
+        written = [each if "=" in each else f"{self.driven()}={each}" for each in assignments]
 
         def definition(name: str) -> NumberDefinition:
             full = self.input_named(name)

@@ -65,7 +65,8 @@ def _marched_point(
     from swashplate.equations import stepper
 
     model = own.machine.model
-    walker = stepper(own.machine, [*at], model.every_signal[:1], rate=rate)
+    # all signals: a state that none of the outputs needs is not marched
+    walker = stepper(own.machine, [*at], model.every_signal, rate=rate)
 
     def put(states: Array) -> None:
         kept = walker.state
@@ -210,7 +211,8 @@ def _gain_unit(output: str, input: str) -> str:
         return unit_text(output)
     if output == input:
         return ""
-    return f"{unit_text(output) or '1'}/{unit_text(below)}"
+    above = f"({output})" if "/" in output else output
+    return f"{unit_text(above) or '1'}/{unit_text(below)}"
 
 
 def poles_table(model: LinearModel) -> Table:

@@ -240,7 +240,7 @@ def own_run(own: OwnMachine, command: str, options: Simulating) -> tuple[str, Ru
     """
     from swashplate.equations import simulate
     from swashplate.equations.marching import even_rate
-    from swashplate.maneuvers import parse
+    from swashplate.maneuvers import Maneuver, parse
 
     is_log = _is_file(command)
     log = _checked_log(command) if is_log else None
@@ -249,10 +249,11 @@ def own_run(own: OwnMachine, command: str, options: Simulating) -> tuple[str, Ru
     time = None
     inputs = dict[str, Any](others)
     if log is None:
-        driven = next((name for name in own.needed if name not in others), own.driven)
+        driven = own.driven(others)
         if driven in others:
             raise InputError(f"--measured gives {driven}, which {command} drives: leave one out.")
         maneuver = parse(command)
+        stamps = maneuver.time(rate or options.rate)
         inputs = {driven: maneuver, **others}
         name = maneuver.name
     else:
@@ -263,11 +264,13 @@ def own_run(own: OwnMachine, command: str, options: Simulating) -> tuple[str, Ru
         if not series:
             raise InputError(
                 f"{command} has no column of an input of {own.machine.name}: call one "
-                f"{' or '.join(own.model.external)}, or name it by --measured {own.driven}=COLUMN."
+                f"{' or '.join(own.model.external)}, or write --measured {own.driven()}=COLUMN."
             )
         _check_interpolation(command, options)
-        time = next(iter(series.values())).time
+        stamps = time = next(iter(series.values())).time
         rate = rate or even_rate(time)
+    # the command says how long the run is
+    inputs |= {key: other(stamps) for key, other in others.items() if isinstance(other, Maneuver)}
     own.check_needed([*inputs], "--measured")
     run = simulate(
         own.machine,
@@ -287,14 +290,14 @@ def _columns_of_inputs(own: OwnMachine, log: Log, options: CommandSampling) -> d
     columns = dict[str, str]()
     for name in own.model.external:
         requested = name
-        if options.stated_column is not None and name == own.driven:
+        if options.stated_column is not None and name == own.driven():
             requested = options.stated_column
         last = requested.rpartition(".")[2]
         is_only = [each.rpartition(".")[2] for each in own.model.external].count(last) == 1
         for column in (requested, last) if is_only else (requested,):
             if name not in columns and _has(log, column):
                 columns[name] = column
-    if options.stated_column is not None and own.driven not in columns:
+    if options.stated_column is not None and own.driven() not in columns:
         log.find(options.stated_column)
     return columns
 
