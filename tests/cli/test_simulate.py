@@ -313,8 +313,8 @@ def test_a_packaged_name_goes_before_a_folder(done, refused, tmp_path):
     Path("hoist/parameters.toml").touch()
     assert "user-defined model" in refused("limits", "./hoist")
     said = refused("export", "./hoist", "--fmu", "hoist.fmu")
-    assert 'swashplate.export.fmu(machine, "model.fmu", step=...)' in said
-    assert "hoist/parameters.toml" in said
+    assert "hoist is the fit of a user-defined model" in said
+    assert "--model valve.py" in said
 
 
 # --- export ---------------------------------------------------------------------------------------

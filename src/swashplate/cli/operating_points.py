@@ -6,18 +6,18 @@ from collections.abc import Mapping, Sequence
 from math import inf, pi
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-import numpy as np
-from numpy.typing import NDArray
-
 from swashplate.cli.machines import OwnMachine, without_empty
 from swashplate.errors import DomainError, InputError
 from swashplate.tables import Cell, Column, Table, count
 from swashplate.units import unit_text
 
 if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
     from swashplate.linear import LinearModel
 
-Array = NDArray[np.float64]
+    Array = NDArray[np.float64]
 FIRST, LONGEST = 1.0, 1024.0
 """Time after which a machine may have settled, and must have. [s]"""
 SETTLED, STEADY = 1e-9, 1e-6
@@ -43,6 +43,8 @@ def operating_point(own: OwnMachine, at: Mapping[str, float], rate: float) -> Op
     Those that the command line sets, if it sets any; else those of the model's own equation, or
     where a march from the start ends once nothing changes but at a constant rate.
     """
+    import numpy as np
+
     from swashplate.equations import floats_of, state_paths
 
     machine = own.machine
@@ -62,6 +64,8 @@ def _marched_point(
     own: OwnMachine, at: Mapping[str, float], rate: float, begin: Array
 ) -> OperatingPoint:
     """Where a march under constant inputs ends."""
+    import numpy as np
+
     from swashplate.equations import stepper
 
     model = own.machine.model
@@ -174,6 +178,8 @@ def _point_table(own: OwnMachine, at: Mapping[str, float], point: OperatingPoint
 
 
 def _gains_table(own: OwnMachine, model: LinearModel, frequency: float) -> Table:
+    import numpy as np
+
     at = f"at {frequency:g} Hz"
     columns = (
         Column("from"),
@@ -217,6 +223,8 @@ def _gain_unit(output: str, input: str) -> str:
 
 def poles_table(model: LinearModel) -> Table:
     """Poles in the s-plane, of two conjugate ones the upper; those of delays are left out."""
+    import numpy as np
+
     columns = (
         Column("Poles"),
         Column("real", ".5g"),

@@ -165,7 +165,7 @@ def show_parameters(
         ),
     ] = False,
 ) -> None:
-    """Show every parameter of a drive or a machine of your own, or list the packaged drives.
+    """Show the parameters of a drive or of your own machine, or list drives.
 
     Each parameter is shown with its unit and its source. A parameter with a plus
     and a minus value has one for each direction; both are magnitudes. Units are

@@ -169,10 +169,8 @@ def fitted_drive(folder: str | Path) -> Path:
         return file
     if (Path(folder) / FITTED_NUMBERS).is_file():
         raise MissingFileError(
-            f"{folder} is the fit of a user-defined model: give its file by --model if the command "
-            "has that option. In Python swashplate.equations.simulate(machine, ...) runs it and "
-            'swashplate.export.fmu(machine, "model.fmu", step=...) writes an FMU of it, with '
-            f"machine = Machine(model, ...) of the numbers in {Path(folder) / FITTED_NUMBERS}."
+            f"{folder} is the fit of a user-defined model: name its file as well, such as --model "
+            "valve.py, where a command has that option."
         )
     raise MissingFileError(
         f"There is no {FITTED_DRIVE} in {folder}: give a folder that 'swashplate fit' or "
