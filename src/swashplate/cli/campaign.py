@@ -6,7 +6,7 @@ import shlex
 from dataclasses import replace
 from math import radians
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Literal, NamedTuple
 
 import typer
 
@@ -20,6 +20,7 @@ from swashplate.cli.options import (
     DriveChoice,
     Force,
     InitialDrive,
+    ModelFile,
     SeedOption,
     SetupOption,
     new_file,
@@ -50,11 +51,12 @@ from swashplate.tables import (
     made_folder,
     write_text,
 )
+from swashplate.units import unit_text
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Mapping, Sequence
 
-    from swashplate.identification import RunInformation
+    from swashplate.identification import Advice, RunInformation, Sensor
 
 LEGEND = (
     "jitter and longest gap in ms; clip: % of the samples at the ends of the instrument's range;\n"
@@ -491,6 +493,7 @@ def guess(
         swashplate advise harbour/campaign.toml --maneuver step:-9 --top 1
         swashplate advise harbour/campaign.toml --runs runs.csv --out tests.csv
         swashplate advise hoist                                      before any test
+        swashplate advise valve/campaign.toml --model valve.py       a machine of your own
     """,
 )
 def advise(
@@ -511,10 +514,11 @@ def advise(
             metavar="SET.toml",
             help=(
                 "Fitted drive: noise is that of its residuals, and the default of --setup is the "
-                "setup.toml next to it."
+                "setup.toml next to it; with --model the folder of its fit."
             ),
         ),
     ] = None,
+    model: ModelFile = None,
     maneuver: Annotated[
         list[str] | None,
         typer.Option(
@@ -567,14 +571,27 @@ def advise(
     from swashplate.identification.diagnostics import check_runs, refuse_unsound
     from swashplate.identification.estimation import smooth
     from swashplate.identification.statistics import (
-        advice_table,
-        best_tests_table,
         default_maneuvers,
         largest_of_machine,
         ranges_of_input,
         sequential_plan,
     )
 
+    if model is not None or parsing.machine_word(subject) is not None:
+        given: dict[str, object] = {"--setup": setup, "--from": begin, "--largest": largest}
+        for option, stated in given.items():
+            if stated is not None:
+                raise InputError(
+                    f"{option} is for a drive: leave it out; the model file states what is free."
+                )
+        if model is None:
+            raise InputError(
+                f"{subject} has no tests: name their campaign first, and this file with --model, "
+                "as what is measured, and how well, is that of the tests."
+            )
+        shown = _advice_on_model(Path(subject), axis, model, drive, maneuver or (), tests)
+        _show_advice(shown, top, runs=runs, out=out)
+        return
     tested = parsing.file_kind(Path(subject)) == "campaign"
     options = {"--axis": axis, "--from": begin, "--drive": drive, "--runs": runs}
     for option, value in options.items():
@@ -615,28 +632,95 @@ def advise(
         candidates = [prior.candidate(test) for test in maneuvers.values()]
         ranked = advise(prior.present, candidates, prior.variables)
         plan_of_tests = sequential_plan(prior.present, candidates, prior.variables, tests)
-    determined = [information.table(run_names) for information in run_informations]
+    sensors = {str(sensor.kind): sensor for sensor in prior.sensors}
+    units = {name: KINDS[sensor.kind].units[0] for name, sensor in sensors.items()}
+    shown = ShownAdvice(run_informations, run_names, doubts, ranked, plan_of_tests, sensors, units)
+    _show_advice(shown, top, runs=runs, out=out)
+
+
+class ShownAdvice(NamedTuple):
+    """What the tests determine, and which come next."""
+
+    run_informations: Sequence[RunInformation]
+    """One a stage; none before any test."""
+    run_names: Sequence[str]
+    doubts: Sequence[str]
+    ranked: Sequence[Advice]
+    plan: Sequence[Advice]
+    sensors: Mapping[str, Sensor]
+    """What is measured, by its kind or channel."""
+    units: Mapping[str, str]
+    """Unit of each."""
+
+
+def _advice_on_model(
+    path: Path,
+    axis: str | None,
+    model: Path,
+    fitted: str | None,
+    maneuvers: Sequence[str],
+    count_of_tests: int,
+) -> ShownAdvice:
+    """Advice on the tests of a user-defined model; `fitted` is the folder of its fit."""
+    from swashplate.cli.machines import fitted_setup
+    from swashplate.identification import (
+        advise,
+        model_prior_information,
+        model_run_information,
+        runs_to_fit,
+    )
+    from swashplate.identification.diagnostics import check_model, refuse_unsound
+    from swashplate.identification.statistics import sequential_plan, usual_maneuvers
+    from swashplate.maneuvers import parse
+
+    with spinner("Evaluating the tests"):
+        campaign, axis_name = parsing.campaign_of(path, axis)
+        experiments = runs_to_fit(campaign, axis_name)
+        setup = fitted_setup(model, fitted)
+        doubts = refuse_unsound(check_model(experiments, setup))
+        information = model_run_information(setup, experiments)
+        prior = model_prior_information(setup, experiments, fitted=fitted is not None)
+        tests = [parse(word) for word in maneuvers] or usual_maneuvers(experiments)
+        candidates = [
+            prior.candidate(test) for test in {each.name: each for each in tests}.values()
+        ]
+        return ShownAdvice(
+            run_informations=[information],
+            run_names=[experiment.name for experiment in experiments],
+            doubts=doubts,
+            ranked=advise(prior.present, candidates, prior.variables),
+            plan=sequential_plan(prior.present, candidates, prior.variables, count_of_tests),
+            sensors=prior.sensors,
+            units={name: unit_text(prior.run[name].unit) for name in prior.sensors},
+        )
+
+
+def _show_advice(shown: ShownAdvice, top: int, *, runs: Path | None, out: Path | None) -> None:
+    """Print what the tests determine, then the tests to come."""
+    from swashplate.identification.statistics import advice_table, best_tests_table
+
+    determined = [information.table(shown.run_names) for information in shown.run_informations]
     if determined:
         save(runs, "Shares of the information", joined(determined).write)
-    save(out, "Tests", advice_table("", ranked).write)
-    for sentence in doubts:
+    save(out, "Tests", advice_table("", shown.ranked).write)
+    for sentence in shown.doubts:
         say(f"! {sentence}")
-    _show_determined(run_informations, determined, run_names)
-    show(advice_table("Tests", ranked[:top]))
-    if plan_of_tests:
-        show(advice_table("Plan, each test in addition to those before it", plan_of_tests))
-        errors = zip(plan_of_tests[-1].names, plan_of_tests[-1].after, strict=True)
+    _show_determined(shown.run_informations, determined, shown.run_names)
+    show(advice_table("Tests", shown.ranked[:top]))
+    if shown.plan:
+        show(advice_table("Plan, each test in addition to those before it", shown.plan))
+        errors = zip(shown.plan[-1].names, shown.plan[-1].after, strict=True)
         undetermined = [name for name, error in errors if not error <= 1.0]
         if undetermined:
             say(f"- Still not determined after these: {', '.join(undetermined)}.")
-    show(best_tests_table(ranked))
-    for sensor in prior.sensors:
-        noise = f"{sensor.noise:.3g} {KINDS[sensor.kind].units[0]} ({sensor.origin})"
-        note(f"{sensor.kind}: noise {noise}, one independent sample every {sensor.memory:.3g} s")
+    show(best_tests_table(shown.ranked))
+    for name, sensor in shown.sensors.items():
+        noise = f"{sensor.noise:.3g} {shown.units[name]} ({sensor.origin})"
+        note(f"{name}: noise {noise}, one independent sample every {sensor.memory:.3g} s")
     say(
         "Errors are standard errors in per cent of the value, from noise alone, at these values of "
-        "the drive; '-': not determined (100 % and more). 'better' is the mean factor by which the "
-        "errors of the parameters that are determined already would shrink."
+        "the machine; '-': not determined (100 % and more). 'better' is the mean factor by which "
+        "the errors of the parameters that are determined already would shrink."
     )
 
 

@@ -244,6 +244,22 @@ def _of_model(found: UserModel, word: MachineWord, module: ModuleType, title: st
     )
 
 
+def fitted_setup(model: Path, fitted: str | None) -> ModelSetup:
+    """What is to be found of a model, from the numbers of a fit on if its folder is named."""
+    from swashplate.identification import ModelSetup
+
+    setup = ModelSetup.from_file(model)
+    if fitted is None:
+        return setup
+    word = MachineWord(model, fitted=fitted)
+    numbers = fitted_numbers(word, setup, [])
+    free = {}
+    for name, unknown in setup.free.items():
+        value = next((numbers[target] for target in unknown.targets if target in numbers), None)
+        free[name] = unknown if value is None else replace(unknown, start=value)
+    return replace(setup, free=free)
+
+
 def fitted_numbers(word: MachineWord, setup: ModelSetup, needed: Sequence[str]) -> dict[str, float]:
     """Numbers in the folder of a fit, those of single runs apart."""
     from swashplate.equations import is_real

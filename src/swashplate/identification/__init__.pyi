@@ -37,7 +37,9 @@ from .resampling import folds_tables as folds_tables
 from .stage_fit import StageFit as StageFit
 from .statistics.determination import Identifiability as Identifiability
 from .statistics.determination import identifiability_of as identifiability_of
+from .statistics.experiment_design import Advice as Advice
 from .statistics.experiment_design import RunInformation as RunInformation
+from .statistics.experiment_design import Sensor as Sensor
 from .statistics.experiment_design import advise as advise
 from .statistics.experiment_design import prior_information as prior_information
 from .statistics.experiment_design import run_information as run_information
@@ -46,6 +48,8 @@ from .statistics.intervals import Uncertainty as Uncertainty
 from .statistics.intervals import estimates_of as estimates_of
 from .statistics.intervals import uncertainty as uncertainty
 from .statistics.intervals import uncertainty_of as uncertainty_of
+from .statistics.model_design import model_prior_information as model_prior_information
+from .statistics.model_design import model_run_information as model_run_information
 from .statistics.profiles import Profile as Profile
 from .statistics.profiles import profiles_of as profiles_of
 from .tables import estimates_table as estimates_table

@@ -11,3 +11,4 @@ from .experiment_design import largest_of_machine as largest_of_machine
 from .experiment_design import ranges_of_input as ranges_of_input
 from .experiment_design import sequential_plan as sequential_plan
 from .intervals import unseen_limits as unseen_limits
+from .model_design import usual_maneuvers as usual_maneuvers

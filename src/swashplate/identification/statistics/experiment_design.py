@@ -71,16 +71,18 @@ class RunInformation(Result):
         return tuple(unknown.name for unknown in self.problem.unknowns if unknown.run is None)
 
     @property
-    def _model(self) -> DriveModel:
-        assert isinstance(self.problem.model, DriveModel)
-        return self.problem.model
+    def _drive_model(self) -> DriveModel | None:
+        """The model of a drive; None of a user-defined model."""
+        model = self.problem.model
+        return model if isinstance(model, DriveModel) else None
 
     @cached_property
     def identifiability(self) -> Identifiability:
         """Which unknowns the runs determine, and directions that change nothing."""
         fit = self.linearised
         estimated = {target for unknown in self.problem.unknowns for target in unknown.targets}
-        numbers = self._model.parameters.numbers
+        drive_model = self._drive_model
+        numbers = self.problem.fixed if drive_model is None else drive_model.parameters.numbers
         fixed = {name: value for name, value in numbers.items() if name not in estimated}
         return identifiability(fit.triangle, fit.variables, tolerance=fit.tolerance, fixed=fixed)
 
@@ -104,7 +106,9 @@ class RunInformation(Result):
 
     def required_excitation(self, name: str) -> str:
         """What a test must reach to inform of an unknown; by default a tilted swash plate."""
-        forces = self._model.forces
+        if self._drive_model is None:
+            return "a motion that depends on it"
+        forces = self._drive_model.forces
         if forces is not None and name in forces.names:
             return f"{abs(forces.currents[name]):g} A beyond Z17"
         definition = CATALOGUE.get(COLUMNS.get(name, name))
@@ -157,7 +161,7 @@ class RunInformation(Result):
         columns = (
             Column("stage", of="f"),
             Column("parameter"),
-            Column("needs", wrap=True),
+            Column("needs", wrap=True, of="tpf" if self._drive_model else ""),
             Column("effect", ".3g"),
             Column("runs"),
             *(Column(run, ".6g", of="f") for run in run_names),
@@ -263,7 +267,7 @@ class PriorInformation(Result):
         stage, rows = self.stage.model_copy(update={"free": free}), []
         for sensor in sensors or self.sensors:
             imagined = _imagined(maneuver, sensor)
-            rows.append(_machine_rows(stage_problem(stage, self.parameters, [imagined])))
+            rows.append(machine_rows(stage_problem(stage, self.parameters, [imagined])))
         return CandidateTest(maneuver.name, triangular_factor(np.vstack(rows)), maneuver.length)
 
 
@@ -301,15 +305,15 @@ def prior_information(
         interval = float(np.median(intervals))
         sensor = Sensor(channels[0].kind, problem.scales[name], origin="as in the campaign")
         if fit is not None:
-            sensor = _of_residuals(fit, channels, sensor, interval)
+            sensor = sensor_of_residuals(fit, channels, sensor, interval)
         # one sample in each `memory` is independent: the others are worth nothing
         scales[name] = sensor.deviation(interval)
         by_kind[sensor.kind] = sensor
     return PriorInformation(
         parameters=parameters,
         stage=stage,
-        variables=_machine_unknowns(problem),
-        present=_machine_rows(replace(problem, scales=scales)),
+        variables=machine_unknowns(problem),
+        present=machine_rows(replace(problem, scales=scales)),
         sensors=tuple(by_kind.values()),
     )
 
@@ -332,13 +336,13 @@ def _without_tests(
     return PriorInformation(
         parameters=parameters,
         stage=stage,
-        variables=_machine_unknowns(problem),
+        variables=machine_unknowns(problem),
         present=prior[:, _machine(problem)],
         sensors=tuple(useful),
     )
 
 
-def _of_residuals(
+def sensor_of_residuals(
     fit: LinearisedFit, channels: Sequence[Channel], stated: Sensor, step: float
 ) -> Sensor:
     """A channel's sensor with the noise that the residuals of a fitted drive show."""
@@ -404,11 +408,12 @@ def _machine(problem: Problem) -> list[int]:
     return [k for k, unknown in enumerate(problem.unknowns) if unknown.run is None]
 
 
-def _machine_unknowns(problem: Problem) -> Unknowns:
+def machine_unknowns(problem: Problem) -> Unknowns:
+    """The unknowns that do not belong to a single run."""
     return Unknowns(tuple(problem.unknowns[k] for k in _machine(problem)))
 
 
-def _machine_rows(problem: Problem) -> Array:
+def machine_rows(problem: Problem) -> Array:
     """(<= K, K) factor of the derivatives by the machine's unknowns, those of single runs spent."""
     derivatives = problem.evaluate(problem.start).jacobian
     machine = _machine(problem)
