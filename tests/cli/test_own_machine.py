@@ -12,8 +12,10 @@ from shutil import which
 import numpy as np
 import polars as pl
 import pytest
+import typer.main
 
-from swashplate import Drive, linear
+from swashplate import Drive, linear, maneuvers
+from swashplate.cli import app
 from swashplate.cli.machines import OwnMachine, machine_in
 from swashplate.cli.parsing import machine_word
 
@@ -377,3 +379,107 @@ def test_a_file_without_a_machine(refused, own, text, said):
 def test_a_machine_without_limits_says_how_to_declare_some(refused, own):
     own(FILE.replace(", limits=limits", "").replace(", lower=-5.0, upper=1.5", ""))
     assert "tank declares no limits" in refused("limits", "own_tank.py")
+
+
+# --- tests to come --------------------------------------------------------------------------------
+
+CAMPAIGN = """
+title = "Tank"
+
+[axes.tank]
+time = { column = "time", unit = "s" }
+input = { kind = "other", column = "valve", unit = "V", interpolation = "previous" }
+channels.level = { kind = "other", column = "level", unit = "bar", noise = 0.01 }
+channels.bias = { kind = "other", column = "bias", unit = "bar" }
+
+[[runs]]
+file = "run.csv"
+"""
+
+
+NOMINAL = np.array([0.5, 2.5, 0.25])
+"""Lag [s], gain [bar/V] and level at the start [bar] that a fit begins with."""
+
+
+def level_of_tank(lag: float, gain: float, start: float) -> np.ndarray:
+    """Level under the step, by formula. [bar]"""
+    time = 0.02 * np.arange(201)
+    rise = gain * (1.0 - np.exp(-np.maximum(time - 1.0, 0.0) / lag))
+    fall = gain * (1.0 - np.exp(-np.maximum(time - 3.0, 0.0) / lag))
+    return rise - fall + start * np.exp(-time / lag)
+
+
+@pytest.fixture
+def campaign(own: Callable[..., str]) -> str:
+    """A campaign of one step of the tank, whose lag is 0.1 s and gain 2 bar/V."""
+    own(FILE.replace('fixed = {"gain": 2.0}', 'free["gain"] = (0.5, 2.5, 8.0, "bar/V")'))
+    time = 0.02 * np.arange(201)
+    valve = maneuvers.parse(STEP)(time)
+    noise = 0.01 * np.random.default_rng(1).standard_normal(time.size)
+    level = level_of_tank(0.1, 2.0, 0.3) + noise
+    frame = {"time": time, "valve": valve, "bias": 0.0 * time, "level": level}
+    pl.DataFrame(frame).write_csv("run.csv")
+    Path("campaign.toml").write_text(CAMPAIGN, "utf-8")
+    return "campaign.toml"
+
+
+def test_a_test_made_twice_tells_twice_as_much(done, number, campaign):
+    words = ("--model", "own_tank.py", "--maneuver", STEP, "--out", "tests.csv")
+    text = done("advise", campaign, *words)
+    assert "1.41x" in text
+    last = text[text.index("For each parameter") :]
+    now, then = (number(last, "gain", place) for place in (0, 2))
+    assert now / then == pytest.approx(np.sqrt(2.0), rel=0.05)
+    # by Fisher information of the formula at the nominal values, one sample in 0.1 s independent
+    by = [
+        (level_of_tank(*(NOMINAL + step)) - level_of_tank(*(NOMINAL - step))) / 2e-6
+        for step in 1e-6 * np.eye(3)
+    ]
+    errors = 0.01 * np.sqrt(5.0) * np.sqrt(np.diag(np.linalg.inv(np.array(by) @ np.array(by).T)))
+    assert now == pytest.approx(100.0 * errors[1] / NOMINAL[1], rel=0.05)
+    assert pl.read_csv("tests.csv")["test"].to_list() == ["step 1 V"]
+
+
+def test_usual_tests_keep_to_the_range_of_the_runs(done, campaign):
+    text = done("advise", campaign, "--model", "own_tank.py", "--top", "20")
+    assert "step 0.9 V" in text
+    assert "step -" not in text  # no run goes the other way
+    done("fit", campaign, "--model", "own_tank.py", "--no-report")
+    text = done("advise", campaign, "--model", "own_tank.py", "--drive", "fitted")
+    assert "residuals of the drive" in text
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (("--setup", "mine.toml"), "--setup is for a drive"),
+        (("--largest", "3"), "--largest is for a drive"),
+    ],
+)
+def test_advice_on_a_model_takes_no_words_of_drives(refused, campaign, words, said):
+    assert said in refused("advise", campaign, "--model", "own_tank.py", *words)
+
+
+def test_a_machine_without_tests_needs_a_campaign(refused, own):
+    assert "name their campaign first" in refused("advise", own())
+
+
+# --- examples -------------------------------------------------------------------------------------
+
+VALVE = re.compile(r"^  (swashplate (?!fit|advise).*valve\.py.*)$", re.MULTILINE)
+EXAMPLES = [
+    found
+    for each in typer.main.get_command(app).commands.values()
+    for found in VALVE.findall(str(each.epilog))
+]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("example", [each for each in EXAMPLES if which("cc") or "fmu" not in each])
+def test_the_examples_can_be_run(done, own, example):
+    page = Path(__file__).parents[2] / "docs" / "how-to" / "user-defined-model-fit.md"
+    (text,) = re.findall(
+        r"^```python\n(# valve\.py\n.*?)^```", page.read_text("utf-8"), re.M | re.S
+    )
+    own(text, "own_valve.py")
+    done(*shlex.split(example.replace("valve.py", "own_valve.py"))[1:])
