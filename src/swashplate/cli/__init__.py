@@ -56,6 +56,7 @@ Examples:
   swashplate full-order hoist step:9                  is one state enough
   swashplate crane run tg3637 --slew 1 --until slew_deg=45
   swashplate export hoist --fmu hoist.fmu             for other programs
+  swashplate simulate valve.py step:2                 a machine of your own
   swashplate demo                                     all steps, on a virtual hoist
 
 Files are in SI units and written atomically. Errors: one sentence on standard

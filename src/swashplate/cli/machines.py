@@ -113,10 +113,8 @@ class OwnMachine:
         """Refuse the lack of an input."""
         lacking = [name for name in self.needed if name not in given]
         if lacking:
-            units = [
-                f" [{unit_text(self.unit(name))}]" if self.unit(name) else "" for name in lacking
-            ]
-            listed = ", ".join(f"{name}{unit}" for name, unit in zip(lacking, units, strict=True))
+            units = {name: unit_text(self.unit(name)) for name in lacking}
+            listed = ", ".join(f"{name} [{unit}]" if unit else name for name, unit in units.items())
             raise InputError(
                 f"{self.machine.name} needs {listed} as well: write {option} {lacking[0]}=NUMBER."
             )
@@ -178,8 +176,8 @@ def machine_in(word: MachineWord) -> OwnMachine | Drive:
         found = UserModel(found)
     if not isinstance(found, UserModel):
         raise InputError(
-            f"{word.file}: {name} is a {type(found).__name__}, which has no equations to run: give "
-            "a Machine, or a Model of equations."
+            f"{word.file}: {name} has the type {type(found).__name__}, without equations to run: "
+            "give a Machine, or a Model of equations."
         )
     return _of_model(found, word, module, title)
 
@@ -190,11 +188,12 @@ def _lacks(word: MachineWord, module: ModuleType) -> str:
     from swashplate.equations import Machine
 
     has = [key for key, value in vars(module).items() if isinstance(value, Drive | Machine)]
-    lacks = f"'{word.name}'" if word.name else "machine: it needs machine = Machine(model, ...)"
     listed = f"; there are {', '.join(has)}" if has else ""
-    if has and not word.name:
-        return f"{word.file} has several machines: write {word.file}:{has[0]}, of {', '.join(has)}."
-    return f"{word.file} has no {lacks}{listed}."
+    if word.name:
+        return f"{word.file} has no '{word.name}'{listed}."
+    if has:
+        return f"{word.file} has no 'machine'{listed}: write {word.file}:{has[0]}."
+    return f"{word.file} has no machine: it needs machine = Machine(model, ...)."
 
 
 def _of_model(found: UserModel, word: MachineWord, module: ModuleType, title: str) -> OwnMachine:
@@ -208,7 +207,7 @@ def _of_model(found: UserModel, word: MachineWord, module: ModuleType, title: st
     setup = None
     if hasattr(module, "free"):
         setup = ModelSetup.from_file(word.file)
-        if setup.model is found or setup.model.model is model:
+        if getattr(setup.model, "model", None) is model:
             numbers = dict(setup.fixed)
             for unknown in setup.free.values():
                 numbers |= dict.fromkeys(unknown.targets, unknown.start)
@@ -324,11 +323,11 @@ def changed(own: OwnMachine, values: Sequence[str] = (), factors: Sequence[str] 
     def full(name: str) -> str:
         known = full_name(name, names)
         if known.startswith("start.") and known not in names:
-            known = f"start.{full_name(name.removeprefix('start.'), [s[6:] for s in starts])}"
+            paths = [start.removeprefix("start.") for start in starts]
+            known = "start." + full_name(name.removeprefix("start."), paths)
         if known not in names:
-            raise UnknownNameError(
-                f"{own.machine.name} has no parameter {near_names(name, names)}."
-            )
+            has_not = f"{own.machine.name} has no parameter"
+            raise UnknownNameError(f"{has_not} {near_names(name, names)}.")
         return known
 
     def definition(name: str) -> NumberDefinition:

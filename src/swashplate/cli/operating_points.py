@@ -26,7 +26,7 @@ AT_ZERO = 1e-9
 """Size of a sampled pole, or distance of it from 1, that counts as 0. [1]"""
 
 
-class OperatingPoint(NamedTuple):
+class MachinePoint(NamedTuple):
     """States under constant inputs."""
 
     states: Array
@@ -37,7 +37,7 @@ class OperatingPoint(NamedTuple):
     """Whether the model's own equation gives them."""
 
 
-def operating_point(own: OwnMachine, at: Mapping[str, float], rate: float) -> OperatingPoint:
+def operating_point(own: OwnMachine, at: Mapping[str, float], rate: float) -> MachinePoint:
     """States that a machine settles at under constant inputs, in steps of a rate [Hz].
 
     Those that the command line sets, if it sets any; else those of the model's own equation, or
@@ -51,18 +51,18 @@ def operating_point(own: OwnMachine, at: Mapping[str, float], rate: float) -> Op
     settles = all(part.settled or not floats_of(part.state) for part in machine.model.parts)
     if settles and not own.stated:
         states = machine.start(at, 1.0 / rate, "steady").flat
-        return OperatingPoint(states, np.zeros(states.size), by_equation=True)
+        return MachinePoint(states, np.zeros(states.size), by_equation=True)
     states = machine.start(at, 1.0 / rate, "rest").flat
     for path, value in own.begin.items():
         states[state_paths(machine.model).index(path)] = value
     if own.stated:
-        return OperatingPoint(states, np.zeros(states.size))
+        return MachinePoint(states, np.zeros(states.size))
     return _marched_point(own, at, rate, states)
 
 
 def _marched_point(
     own: OwnMachine, at: Mapping[str, float], rate: float, begin: Array
-) -> OperatingPoint:
+) -> MachinePoint:
     """Where a march under constant inputs ends."""
     import numpy as np
 
@@ -110,14 +110,14 @@ def _marched_point(
         initial=0.0
     ) + SETTLED * np.abs(states).max(initial=0.0):
         states = from_start
-    return OperatingPoint(states, rates)
+    return MachinePoint(states, rates)
 
 
 def linear_model(
     own: OwnMachine,
     at: Mapping[str, float],
     rate: float,
-    point: OperatingPoint,
+    point: MachinePoint,
     *,
     inputs: Sequence[str] | None = None,
     outputs: Sequence[str] | None = None,
@@ -148,7 +148,7 @@ def outputs_named(own: OwnMachine, names: Sequence[str] | None) -> list[str] | N
 def linear_tables(
     own: OwnMachine,
     at: Mapping[str, float],
-    point: OperatingPoint,
+    point: MachinePoint,
     model: LinearModel,
     frequency: float,
 ) -> list[Table]:
@@ -156,7 +156,7 @@ def linear_tables(
     return [_point_table(own, at, point), _gains_table(own, model, frequency), poles_table(model)]
 
 
-def _point_table(own: OwnMachine, at: Mapping[str, float], point: OperatingPoint) -> Table:
+def _point_table(own: OwnMachine, at: Mapping[str, float], point: MachinePoint) -> Table:
     from swashplate.equations import state_paths
 
     columns = (Column("Operating point"), Column("is"), Column("", ".5g"), Column("unit"))

@@ -52,7 +52,7 @@ _INSTEAD = {
     (
         "model",
         "drive",
-    ): "simulate, show, limits, linearize, bode and export take it, this one does not",
+    ): "simulate, show, limits, linearize, bode and export take it",
     ("model", "campaign"): "name the campaign first, and this file with --model",
 }
 
