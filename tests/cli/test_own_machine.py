@@ -73,6 +73,12 @@ settling = Machine(Model("tank", Filter, State, step, settled=settled), Filter(l
 pair = join("pair", {"left": slow, "right": settling})
 winch = Drive.preset("hoist").scale(Z16=0.5)
 """
+WITH_WAY = (
+    FILE.replace("    level: Annotated[float", "    way: float\n    level: Annotated[float")
+    .replace("return State((p.gain", "return State(state.level, (p.gain")
+    .replace("    return State(p.gain * valve + bias)", "    return State(0.0, p.gain * valve)")
+)
+"""The same with the integral of the level as a state."""
 NO_BIAS = ("--measured", "bias=0")
 STEP = "step:1,start=1,stop=3,length=4"
 
@@ -231,20 +237,20 @@ def test_a_linear_model_is_that_of_python(done, own):
 
 
 def test_a_position_goes_on_from_its_start(done, number, own):
-    """A velocity v = u and a position: the first settles, the second is an integrator."""
-    own(
-        FILE.replace(
-            "    level: Annotated[float",
-            "    way: float\n    level: Annotated[float",
-        )
-        .replace("return State((p.gain", "return State(state.level, (p.gain")
-        .replace("    return State(p.gain * valve + bias)", "    return State(0.0, p.gain * valve)")
-    )
+    """The level settles, and its integral is that of the level."""
+    own(WITH_WAY)
     words = ("--at", "valve=0.5", "--at", "bias=0", "--output", "way")
     text = done("linearize", "own_tank.py", *words)
     assert number(text, "way              state") == 0.0
     assert "by 1 1/s" in text
     assert text.count("integrates") == 3
+
+
+def test_a_position_that_runs_on_has_no_frequency_response(done, refused, own):
+    own(WITH_WAY)
+    words = ("bode", "own_tank.py", "--at", "bias=0", "--output", "way", "--points", "2")
+    assert "way runs on under this mean, by 1 a second" in refused(*words, "--bias", "0.5")
+    assert "valve to way" in done(*words)
 
 
 def test_a_sine_is_answered_as_by_formula(done, own):
@@ -338,6 +344,10 @@ REFUSED = {
     "linearize hoist --at 4 --output shaft_speed": "--output is for a machine of your own",
     "linearize hoist --at four": "--at four... number",
     "linearize hoist --at 4 --input speed": "--input speed... voltage, current, solenoid_force",
+    "linearize own_tank.py --at 1 --at bias=0 --rate 0": "rate is 0",
+    "linearize own_tank.py --at 1 --at bias=0 --frequency 300": "--frequency is 300 Hz... 256 Hz",
+    "simulate own_tank.py:x.y step:1": "own_tank.py has no 'x.y'",
+    "show own_tank.py --set lag=nan": "lag=nan",
     "bode own_tank.py": "bias [bar]",
     "bode own_tank.py --at bias=0 --at valve=1": "valve, ... --bias",
     "compare hoist own_tank.py": "own_tank.py is a model file, not a drive",

@@ -19,6 +19,7 @@ from swashplate.cli.operating_points import (
     linear_tables,
     operating_point,
     outputs_named,
+    rates_under,
 )
 from swashplate.cli.options import (
     NO_VALUE,
@@ -793,6 +794,12 @@ def _own_response(
     if input in at:
         raise InputError(f"--at gives {input}, which is moved: its mean is --bias.")
     own.check_needed([input, *at], "--at")
+    rate_of_output = rates_under(own, {input: sine.bias, **at}, rate).get(output, 0.0)
+    if rate_of_output:
+        raise InputError(
+            f"{output} runs on under this mean, by {rate_of_output:.4g} a second, so that sines "
+            "have no lasting answer: take another --bias, or an --output that comes back."
+        )
     response = sweep(
         own.machine,
         grid,

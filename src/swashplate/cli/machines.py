@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from math import isnan
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple, get_type_hints
 
@@ -121,9 +122,12 @@ class OwnMachine:
 
     def steps_a_second(self, stated: float | None = None) -> float:
         """Steps of its equations, as many as `simulate` takes, unless others are stated. [Hz]"""
-        from swashplate.equations.marching import SOURCE_RATE
+        from swashplate.equations.marching import SOURCE_RATE, check_rate
 
-        return stated or (self.rate or SOURCE_RATE) * (self.substeps or 1)
+        if stated is not None:
+            check_rate(stated)
+            return stated
+        return (self.rate or SOURCE_RATE) * (self.substeps or 1)
 
     def table(self) -> Table:
         """Its parameters with their units."""
@@ -339,6 +343,8 @@ def changed(own: OwnMachine, values: Sequence[str] = (), factors: Sequence[str] 
     begin, stated = dict(own.begin), set(own.stated)
     lines = list[str]()
     for name, value in {full(each): number for each, number in to_set.items()}.items():
+        if isnan(value):
+            raise InputError(f"--set {name}=nan is no number; write it as {EXAMPLE}.")
         if name in starts:
             paths = states_started_by(model, name)
             begin |= dict.fromkeys(paths, value)

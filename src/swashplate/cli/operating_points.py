@@ -113,6 +113,20 @@ def _marched_point(
     return MachinePoint(states, rates)
 
 
+def rates_under(own: OwnMachine, at: Mapping[str, float], rate: float) -> dict[str, float]:
+    """Rates of the states that go on under constant inputs, by signal; none if nothing settles."""
+    try:
+        rates = operating_point(own, at, rate).rates.tolist()
+    except DomainError:
+        return {}
+    return dict(zip(_signals_of_states(own), rates, strict=True))
+
+
+def _signals_of_states(own: OwnMachine) -> list[str]:
+    """Signal of each state, in the order of `state_paths`."""
+    return [own.model.parts[index].full(path) for index, path in own.model.places("state")]
+
+
 def linear_model(
     own: OwnMachine,
     at: Mapping[str, float],
@@ -163,12 +177,7 @@ def _point_table(own: OwnMachine, at: Mapping[str, float], point: MachinePoint) 
     table = Table("", (*columns, Column("changes", "s")))
     for name, value in at.items():
         table.add(name, "input", value, unit_text(own.unit(name)), "")
-    signals = [
-        part.full(path)
-        for k, part in enumerate(own.model.parts)
-        for index, path in own.model.places("state")
-        if index == k
-    ]
+    signals = _signals_of_states(own)
     rows = zip(state_paths(own.model), signals, point.states, point.rates, strict=True)
     for path, signal, value, rate in rows:
         unit = unit_text(own.unit(signal))

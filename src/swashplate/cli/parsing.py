@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 _NUMBER = r"[+-]?(?:(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?|inf\b|nan\b)"
 _VALUE = re.compile(rf"\s*({_NUMBER})(?:/({_NUMBER}))?\s*((?:1/)?[^\W\d_].*|°.*)?")
-_MACHINE_WORD = re.compile(r"(.+\.py)(?::(\w*))?")
+_MACHINE_WORD = re.compile(r"(.+\.py)(?::(.*))?")
 SETUP_FILE, NUMBERS, FIT_FILE = "setup.toml", "parameters.toml", "fit.json"
 """In a folder that a fit wrote: its fit setup, the numbers of a user-defined model, the fit."""
 LOAD = "load_torque"

@@ -255,7 +255,7 @@ def own_run(own: OwnMachine, command: str, options: Simulating) -> tuple[str, Ru
         maneuver = parse(command)
         stamps = maneuver.time(rate or options.rate)
         inputs = {driven: maneuver, **others}
-        name = maneuver.name
+        name = maneuver.name if own.unit(driven) in ("", "V") else command  # a maneuver's is in V
     else:
         name = Path(command).name
         columns = _columns_of_inputs(own, log, options)
