@@ -202,9 +202,12 @@ def test_a_joined_machine_is_named_by_paths(done, own):
     np.testing.assert_allclose(level[before], 1.0 - np.exp(-time[before]), atol=1e-8)
 
 
-def test_a_script_finds_no_arguments(done, own):
-    own("import sys\nassert len(sys.argv) == 1\n" + FILE)
-    done("show", "own_tank.py")
+def test_a_script_finds_no_arguments_and_prints_aside(run, own):
+    own("import sys\nassert len(sys.argv) == 1\nprint('as a script')\n" + FILE)
+    result = run("show", "own_tank.py")
+    assert result.exit_code == 0
+    assert result.stderr == "as a script\n"
+    assert "script" not in result.stdout
 
 
 # --- analyse --------------------------------------------------------------------------------------

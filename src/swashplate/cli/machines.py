@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Collection, Iterator, Mapping, Sequence
+from contextlib import redirect_stdout
 from dataclasses import dataclass, field, replace
 from math import isnan
 from pathlib import Path
@@ -164,7 +166,9 @@ def machine_in(word: MachineWord) -> OwnMachine | Drive:
     from swashplate.identification import UserModel
     from swashplate.identification.estimation import loaded_module
 
-    module = loaded_module(word.file)
+    # a script may print: that is no part of what the command says
+    with redirect_stdout(sys.stderr):
+        module = loaded_module(word.file)
     name = word.name or (MODEL if word.fitted or not hasattr(module, MACHINE) else MACHINE)
     if not hasattr(module, name):
         raise UnknownNameError(_lacks(word, module))
