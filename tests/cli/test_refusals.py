@@ -17,7 +17,7 @@ REFUSED = {
     "show hoist --units m/min --drum 0": "diameter ... 0 m",
     "show hoist --units rpm,deg/s": "rpm and deg/s",
     "whatif hoist --scale pump=1.2 --out w.csv": "w.csv... .toml",
-    "export hoist --c folder --step 0.005": "swp_step",
+    "export hoist --c folder --step 0.005": "several times per sample",
     "linearize hoist": "--at and --current",
     "linearize hoist --current 1 --input voltage": "--at",
     "linearize hoist --at 0.1": "card's dead zone... +0.",

@@ -596,7 +596,7 @@ def test_comparison_says_what_is_equal(hoist, tmp_path, fmi):
     found = export.compare(path, hoist, command(500))
     assert found.equal
     assert found.samples == 500
-    assert set(found.differences) == set(OUTPUTS)
+    assert set(found.differences) == {*OUTPUTS, "motor_torque", "motor_pressure_drop"}
     other = export.compare(path, hoist.replace(Z10=12.0), command(500))
     assert not other.equal
     assert other.differences["shaft_speed"] > 1e-3
@@ -611,5 +611,5 @@ def test_comparison_refuses_what_it_cannot_run(hoist, tmp_path):
     path = export.fmu(hoist, tmp_path / "drive.fmu")
     with pytest.raises(ValueError, match="two samples"):
         export.compare(path, hoist, [1.0])
-    with pytest.raises(ValueError, match="with a drive, not with Model"):
+    with pytest.raises(ValueError, match="a Machine, not with Model"):
         export.compare(path, pump_drive, command(10))

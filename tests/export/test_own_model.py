@@ -29,7 +29,7 @@ from swashplate.equations import (
     simulate,
 )
 from swashplate.errors import EquationError
-from swashplate.export import c, content_of, drive_sources, fmu, libraries, values_of, wasm
+from swashplate.export import c, compare, content_of, drive_sources, fmu, libraries, values_of, wasm
 from swashplate.export.c_source import Exported, interface
 from swashplate.models import displacement_control
 from swashplate.models.drive import drive
@@ -428,6 +428,9 @@ def test_an_fmu_of_two_drives_on_one_load_has_the_bits_of_its_march(
     assert run["position"][-1] > 0.1
     for name in names:
         assert (found[name] == run[name]).all(), name
+    compared = compare(path, tugging, inputs)
+    assert compared.equal
+    assert {*names, "port.current", "starboard.motor_torque"} <= compared.differences.keys()
 
 
 @pytest.mark.slow

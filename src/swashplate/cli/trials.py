@@ -206,7 +206,7 @@ def _is_column(log: Log, requested: str, column: str) -> bool:
 
 def _measured_inputs(assignments: Sequence[str], log: str, time_column: str) -> dict[str, Any]:
     """Inputs other than the voltage by name: a column of a log, or a number."""
-    from swashplate.drive import MEASURED
+    from swashplate.drive import MEASURED, UNITS
     from swashplate.logs import read_series
 
     inputs = dict[str, Any]()
@@ -224,7 +224,7 @@ def _measured_inputs(assignments: Sequence[str], log: str, time_column: str) -> 
                 raise InputError(
                     f"--measured {assignment}: a maneuver has no columns, so give a number in SI."
                 ) from None
-            unit = MEASURED[name][0]
+            unit = UNITS[name]
             inputs[name] = read_series(log, text, unit, time_column=time_column).values
     return inputs
 

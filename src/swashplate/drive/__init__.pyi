@@ -19,7 +19,6 @@ from .march import Sample as Sample
 from .march import simulate_drive as simulate_drive
 from .records import RunKeywords as RunKeywords
 from .records import drive_records as drive_records
-from .signals import CHAIN as CHAIN
 from .signals import MEASURED as MEASURED
 from .signals import MOTOR as MOTOR
 from .signals import SIGNALS as SIGNALS

@@ -1,33 +1,28 @@
-"""Signals of a drive: names, units and meaning, in the order of the chain."""
+"""Signals of a drive by name, in the order of the chain; its model says units and meaning."""
 
 from swashplate.errors import InputError
+from swashplate.models.drive import drive
 
-CHAIN = {
-    "voltage": ("V", "command of the card within ±10 V, positive towards positive speed"),
-    "current": ("A", "signed current, positive solenoid's less the negative one's"),
-    "current_positive": ("A", "current of the solenoid towards positive speed, never negative"),
-    "current_negative": ("A", "current of the other solenoid, never negative"),
-    "solenoid_force": ("N", "net force of both solenoids on the spool"),
-    "spool_position": ("m", "displacement of the spool, within its stroke"),
-    "orifice_opening": ("m", "effective opening, what the orifices leave of the displacement"),
-    "stroker_pressure": ("Pa", "stroking pressure about its equilibrium"),
-    "swash_angle": ("rad", "angle of the swash plate"),
-    "shaft_speed": ("rad/s", "speed of the shaft, of the turret for slew"),
-    "shaft_position": ("rad", "integral of the speed, zero at the start"),
-}
-"""SI unit and meaning of each signal of a simulation, in the order of the chain."""
-MOTOR = {
-    "motor_torque": ("N m", "torque of the motor, positive if it drives towards positive speed"),
-    "motor_pressure_drop": ("Pa", "pressure drop over the motor, 0 if motor_constant is not known"),
-}
-MEASURED = {
-    "load_torque": ("N m", "static torque of the load, positive against positive speed"),
-    "pump_speed": ("1", "speed of the prime mover, relative to that of Z10"),
-    "supply_pressure": ("Pa", "supply pressure less static pressure; until it is set, Z9 counts"),
-}
+SIGNALS = (
+    "voltage",
+    "current",
+    "current_positive",
+    "current_negative",
+    "solenoid_force",
+    "spool_position",
+    "orifice_opening",
+    "stroker_pressure",
+    "swash_angle",
+    "shaft_speed",
+    "shaft_position",
+)
+"""Signals of a simulation, in the order of the chain."""
+MOTOR = ("motor_torque", "motor_pressure_drop")
+"""Those of the motor, which only a drive with refinements shows."""
+MEASURED = ("load_torque", "pump_speed", "supply_pressure")
 """Those of inputs that may be measured in addition to the command."""
-UNITS = {name: unit for name, (unit, _) in {**CHAIN, **MOTOR, **MEASURED}.items()}
-SIGNALS = tuple(CHAIN)
+UNITS = {name: drive.definitions[name].unit for name in (*SIGNALS, *MOTOR, *MEASURED)}
+"""SI unit of each."""
 OUTPUTS = ("current_sum", *SIGNALS[1:], *MOTOR)
 """Signals that can be observed, or returned and compared by a batch."""
 FIRST_SIGNALS = (

@@ -90,7 +90,7 @@ class Simulation(Run):
     def names(self) -> tuple[str, ...]:
         """The signals that it has: `SIGNALS`, with refinements the motor's, after ``"time"``."""
         signals = SIGNALS if self.driven_by == "voltage" else SIGNALS[1:]
-        motor_signals = tuple(MOTOR)
+        motor_signals: tuple[str, ...] = MOTOR
         if not self.refined:
             motor_signals = ()
         elif not self.pump.motor_constant > 0.0:

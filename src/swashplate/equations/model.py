@@ -359,6 +359,13 @@ class Model:
         for part in self.parts:
             for kind in filter(None, (part.state, part.signals)):
                 declared |= {part.full(name): each for name, each in definitions_of(kind).items()}
+        for name, link in self.links.items():
+            definition = definition_of(type_of(link.equation, "return")) if link.equation else None
+            if definition is not None:
+                declared[name] = definition
+        for name, rate in self.integrals.items():
+            if rate in declared:
+                declared[name] = _integral(rate, declared[rate])
         return declared
 
     @cached_property
@@ -499,6 +506,13 @@ def _wrong(model: Model) -> Iterator[str]:
             yield f"{prefix}'{name}' is both an input and in {where}: rename one of them."
         if name == "time":
             yield f"{prefix}'time' is in {where}, but means the time stamps: rename it."
+
+
+def _integral(rate: str, definition: Definition) -> Definition:
+    """What the integral over time of a signal is."""
+    unit = definition.unit
+    of_time = unit.removesuffix("/s") if unit.endswith("/s") else f"{unit} s".removeprefix("1 ")
+    return Definition(f"integral of {rate}, zero at the start", of_time or "1")
 
 
 def _own_names(model: Model) -> Iterator[tuple[str, str]]:

@@ -33,7 +33,7 @@ from swashplate.errors import FileError, InputError, InputTypeError
 from swashplate.export.c_source import Exported, interface, numbers, writer_of
 from swashplate.export.variable_list import (
     DRIVE,
-    DRIVE_DESCRIPTIONS,
+    DRIVE_OPTIONS,
     OWN,
     Description,
     References,
@@ -168,7 +168,7 @@ def content_of(what: Drive | Machine, step: float, *, prefix: str = "swp") -> Co
     if not step <= longest:
         raise InputError(
             f"The step is {step:g} s, but must be above 0 and at most 1/{1.0 / longest:g} s: an "
-            f"FMU's master may use longer steps; in C, call {prefix}_step several times per sample."
+            f"FMU's master may use longer steps; in C, step several times per sample."
         )
     machine = what.at_step(step)
     if machine is not what:
@@ -180,7 +180,7 @@ def content_of(what: Drive | Machine, step: float, *, prefix: str = "swp") -> Co
     machine.check_step(step)
     if isinstance(machine, Drive):  # its names and value references never change
         exported = exported_drive(machine)
-        references, descriptions = DRIVE, DRIVE_DESCRIPTIONS
+        references, descriptions = DRIVE, DRIVE_OPTIONS | descriptions_of(exported)
     else:
         exported = Exported(machine.model, prefix)
         references, descriptions = OWN, descriptions_of(exported)

@@ -12,7 +12,6 @@ from dataclasses import dataclass, replace
 from math import inf, isfinite
 from typing import Any, Literal, NamedTuple
 
-from swashplate.drive import CHAIN, MEASURED, MOTOR
 from swashplate.equations import Definition, declared_by
 from swashplate.equations.code_generation import c_literal
 from swashplate.export.c_source import Exported
@@ -53,18 +52,14 @@ class Description(NamedTuple):
     """Its name outside the model, if it has another there."""
 
 
-DRIVE_DESCRIPTIONS: dict[str, Description] = {
-    **{
-        name: Description(said, unit)
-        for name, (unit, said) in {**CHAIN, **MOTOR, **MEASURED}.items()
-    },
+DRIVE_OPTIONS: dict[str, Description] = {
     "literal": Description("literal sign of the card's Coulomb term", name="literal_coulomb_sign"),
     "split": Description("the card's limits take over within a step", name="split_card_switch"),
     "symmetric": Description(
         "root of the supply pressure less the signed pressure", name="symmetric_root"
     ),
 }
-"""Signals of a drive, and options that can be set before a run, by the model's names."""
+"""Options of a drive that can be set before a run, by the model's names."""
 
 
 LONGEST_LINE = 1020
@@ -92,13 +87,11 @@ class Variable:
 
 
 def descriptions_of(exported: Exported) -> dict[str, Description]:
-    """Meaning and unit of the signals of a user-defined model, as far as its types declare them."""
-    descriptions = {}
-    for part in exported.model.parts:
-        for kind in (part.state, part.signals):
-            for definition, path in _declared(kind) if kind is not None else ():
-                descriptions[path] = Description(definition.name, definition.unit or "1")
-    return descriptions
+    """Meaning and unit of the inputs and signals of a model, as far as its types declare them."""
+    return {
+        name: Description(definition.name, definition.unit or "1")
+        for name, definition in exported.model.definitions.items()
+    }
 
 
 def _declared(kind: type) -> Iterator[tuple[Definition, str]]:

@@ -80,8 +80,20 @@ class CardChannel(NamedTuple):
     # fmt: on
 
 
-Command = Annotated[Window, Definition("command of the card", "V", lower=-10.0, upper=10.0)]
+Command = Annotated[
+    Window,
+    Definition(
+        "command of the card, positive towards positive speed", "V", lower=-10.0, upper=10.0
+    ),
+]
 """Beyond its range the card takes no voltage."""
+SignedCurrent = Annotated[
+    float, Definition("signed current, positive solenoid's less the negative one's", "A")
+]
+PositiveCurrent = Annotated[
+    float, Definition("current of the solenoid towards positive speed, never negative", "A")
+]
+NegativeCurrent = Annotated[float, Definition("current of the other solenoid, never negative", "A")]
 
 
 class CardInputs(NamedTuple):
@@ -137,9 +149,9 @@ class CardState(NamedTuple):
 class CardSignals(NamedTuple):
     """What is known of the card at a sample."""
 
-    current: float  # Signed, that of the positive channel less that of the negative one. [A]
-    current_positive: float  # I of the positive channel, never negative. [A]
-    current_negative: float  # I of the negative channel, never negative. [A]
+    current: SignedCurrent
+    current_positive: PositiveCurrent
+    current_negative: NegativeCurrent
     steady_positive: float  # I_ss of the positive channel. [A]
     steady_negative: float  # I_ss of the negative channel. [A]
     filtered_positive: float  # I* of the positive channel. [A]
@@ -151,9 +163,9 @@ class CardSignals(NamedTuple):
 class Currents(NamedTuple):
     """A signed current as the channels of a card would have it. [A]"""
 
-    current: float
-    current_positive: float
-    current_negative: float
+    current: SignedCurrent
+    current_positive: PositiveCurrent
+    current_negative: NegativeCurrent
 
 
 class CardLimits(NamedTuple):

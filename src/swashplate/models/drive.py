@@ -2,13 +2,14 @@
 
 from dataclasses import replace
 from math import inf
-from typing import NamedTuple
+from typing import Annotated, NamedTuple
 
-from swashplate.equations import Model, equation, join
+from swashplate.equations import Definition, Model, equation, join
 from swashplate.models.amplifier import (
     Card,
     CardOptions,
     Currents,
+    SignedCurrent,
     card,
     channel_level,
     flowing_card,
@@ -23,9 +24,11 @@ from swashplate.models.pump import (
     pump_settled,
 )
 
+Ammeter = Annotated[float, Definition("sum of both currents, as an ammeter reads it", "A")]
+
 
 @equation
-def current_sum(current_positive: float, current_negative: float) -> float:
+def current_sum(current_positive: float, current_negative: float) -> Ammeter:
     """What an ammeter around both leads reads. [A]"""
     return current_positive + current_negative
 
@@ -45,7 +48,9 @@ class Nothing(NamedTuple):
 
 
 @equation
-def current_sample(current: float) -> Currents:
+def current_sample(
+    current: SignedCurrent,
+) -> Currents:
     """A given signed current, and its positive and negative part."""
     return Currents(current, max(0.0, current), max(0.0, -current))
 

@@ -117,19 +117,30 @@ class PumpSignals(NamedTuple):
     """What is known of the pump at a sample."""
 
     magnetising_current: float  # Current that the force belongs to, behind the hysteresis. [A]
-    solenoid_force: float  # Net force on the spool, positive towards more speed. [N]
+    solenoid_force: Annotated[float, Definition("net force of both solenoids on the spool", "N")]
     spool_free: float  # Displacement of the spool before its stop. [m]
-    spool_position: float  # Displacement of the spool, within its stroke. [m]
+    spool_position: Annotated[
+        float, Definition("displacement of the spool, within its stroke", "m")
+    ]
     spool_deflection: float  # Distance by which friction holds it back. [m]
-    orifice_opening: float  # What the orifices leave of the spool's displacement. [m]
-    stroker_pressure: float  # Stroking pressure δP about its equilibrium. [Pa]
-    swash_angle: float  # Angle of the swash plate. [rad]
+    orifice_opening: Annotated[
+        float,
+        Definition("effective opening, what the orifices leave of the displacement", "m"),
+    ]
+    stroker_pressure: Annotated[float, Definition("stroking pressure about its equilibrium", "Pa")]
+    swash_angle: Annotated[float, Definition("angle of the swash plate", "rad")]
     swash_rate: float  # Rate of the swash plate, zero at a stop. [rad/s]
     flow_speed: float  # Speed that the pump's flow would give a stiff line. [rad/s]
-    shaft_speed: float  # Speed of the shaft, of the turret for slew. [rad/s]
+    shaft_speed: Annotated[float, Definition("speed of the shaft, of the turret for slew", "rad/s")]
     shaft_angle: float  # Since the start, as the ripple needs it; 0 without. [rad]
-    motor_torque: float  # Positive if the motor drives towards positive speed. [N m]
-    motor_pressure_drop: float  # P_hi - P_lo, 0 if the motor's constant is not known. [Pa]
+    motor_torque: Annotated[
+        float,
+        Definition("torque of the motor, positive if it drives towards positive speed", "N m"),
+    ]
+    motor_pressure_drop: Annotated[
+        float,
+        Definition("pressure drop over the motor, 0 if motor_constant is not known", "Pa"),
+    ]
 
 
 class PumpLimits(NamedTuple):
