@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, NamedTuple, get_type_hints
 
 from swashplate.cli.parsing import NUMBERS, MachineWord, assignments_of
 from swashplate.documents import parse_toml, read_text
-from swashplate.errors import InputError, ParameterError, UnknownNameError
+from swashplate.errors import InputError, UnknownNameError
 from swashplate.tables import UNIT, Column, Table, share_cell
 from swashplate.units import unit_text
 
@@ -360,13 +360,14 @@ def changed(own: OwnMachine, values: Sequence[str] = (), factors: Sequence[str] 
         if name in starts:
             raise InputError(f"--scale {name}: the start of a state is set, by --set {name}=VALUE.")
         numbers[name] *= factor
-    for name, old in numbers_of(own.machine).items():
-        if numbers[name] != old:
-            unit = unit_text(parameters[name].unit)
-            lines.append(f"{name}: {old:g} -> {numbers[name]:g} {unit}".rstrip())
+    before = numbers_of(own.machine)
+    changes = {name: number for name, number in numbers.items() if number != before[name]}
+    for name, number in changes.items():
+        unit = unit_text(parameters[name].unit)
+        lines.append(f"{name}: {before[name]:g} -> {number:g} {unit}".rstrip())
     return replace(
         own,
-        machine=with_numbers(own.machine, numbers),
+        machine=own.machine.replace(changes),
         begin=begin,
         changes=tuple(lines),
         stated=frozenset(stated),
@@ -385,27 +386,6 @@ def _starts(own: OwnMachine) -> Iterator[tuple[str, NumberDefinition]]:
                 f"start.{prefix}{path}",
                 NumberDefinition(own.meaning(signal) or path, own.unit(signal)),
             )
-
-
-def with_numbers(machine: Machine, numbers: Mapping[str, float]) -> Machine:
-    """A machine with other parameters, by path; those beyond their range are refused."""
-    from swashplate.equations import Machine as MachineType
-    from swashplate.equations import floats_of, tuple_from
-
-    model = machine.model
-    for path, definition in model.ranges.items():
-        if not definition.holds(numbers[path]):
-            raise ParameterError(f"{machine.name}: {definition.broken(path, numbers[path])}.")
-    parts = tuple(
-        part._replace(
-            p=tuple_from(
-                each.parameters,
-                {path: numbers[f"{model.prefix(k)}{path}"] for path in floats_of(each.parameters)},
-            )
-        )
-        for k, (each, part) in enumerate(zip(model.parts, machine.parts, strict=True))
-    )
-    return MachineType.of_parts(model, parts, machine.name)
 
 
 # --- runs -----------------------------------------------------------------------------------------

@@ -54,6 +54,7 @@ def linearize_drive(
         outputs=output_names,
         delay=parameters.numbers["tau"] if inputs[0] == "voltage" else 0.0,
         units={name: UNITS[name] for name in (*inputs, *output_names)},
+        at={"current": point.current} if point.voltage is None else {"voltage": point.voltage},
         operating_point=point,
         coulomb=coulomb,
         parameters=parameters,

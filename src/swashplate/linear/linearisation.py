@@ -226,6 +226,7 @@ def _linear_model(
         rate=rate,
         memory=memory,
         units={name: definitions[name].unit for name in (*inputs, *outputs) if name in definitions},
+        at=dict(initial.before),
     )
 
 

@@ -62,6 +62,8 @@ class LinearModel:
     """States that are inputs of earlier samples."""
     units: Mapping[str, str] = field(default_factory=dict)
     """SI units of inputs and outputs by name, as far as they are known."""
+    at: Mapping[str, float] = field(default_factory=dict)
+    """Constant inputs of the operating point, by name; a drive's voltage, or its current. [SI]"""
 
     def __repr__(self) -> str:
         time = "continuous" if self.rate is None else f"sampled at {self.rate:g} Hz"

@@ -11,7 +11,6 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, LogLocator, MultipleLocator, NullFormatter, NullLocator
 from numpy.typing import NDArray
 
-from swashplate.drive import LinearDrive
 from swashplate.errors import InputError
 from swashplate.full_order import SIGNAL_UNITS
 from swashplate.linear import FrequencyResponse, LinearModel
@@ -159,13 +158,10 @@ def _check_ends(linear: LinearModel, response: FrequencyResponse) -> None:
 
 
 def _operating_point_label(linear: LinearModel) -> str:
-    """Operating point of a drive's linear model, such as ``" about 2 V"``; else empty."""
-    if not isinstance(linear, LinearDrive):
-        return ""
-    point = linear.operating_point
-    if point.voltage is None:
-        return f" about {point.current:.4g} A"
-    return f" about {point.voltage:.4g} V"
+    """Operating point of a linear model, such as ``" about 2 V"``; empty if it is not known."""
+    units = {**SIGNAL_UNITS, **linear.units}
+    values = [f"{value:.4g} {units.get(name, '')}".rstrip() for name, value in linear.at.items()]
+    return f" about {', '.join(values)}" if values else ""
 
 
 def _output_unit(response: FrequencyResponse) -> DisplayUnit:

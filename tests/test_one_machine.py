@@ -1,0 +1,33 @@
+"""Few places ask which kind of machine, model or fit they have, each for a reason."""
+
+import re
+from pathlib import Path
+
+import pytest
+from tools.mirror import main
+
+ROOT = Path(__file__).parents[1]
+ASKED = {
+    "analysis": (
+        3,
+        "draws from a fit are those of a drive: identification knows models of its own",
+    ),
+    "cli": (5, "a file of one's own holds a Machine, a Drive, a Model or a UserModel: the door"),
+    "crane": (3, "an axis takes a Drive, or the name, file or fit of one"),
+    "drive": (1, "what is equal to a drive is one"),
+    "equations": (2, "join takes models or machines"),
+    "export": (4, "the door, and a drive's value references, which never change"),
+    "full_order": (1, "what is equal to such a drive is one"),
+    "identification": (51, "a fit has its own kinds of model, until it has one problem"),
+    "linear": (1, "the door: what is no machine is refused"),
+    "report": (2, "a page of a fit is that of a drive or of a user-defined model"),
+}
+"""By package: how often at most, and why."""
+
+
+def test_few_places_ask_which_kind_they_have(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["--tree", str(ROOT)]) == 0
+    _, _, told = capsys.readouterr().out.partition("\nQuestions of kind")
+    found = {package: int(count) for package, count in re.findall(r"^  (\w+) +(\d+) ", told, re.M)}
+    most = {package: count for package, (count, _) in ASKED.items()}
+    assert found == most, "a question more needs a reason, one less a lower count"
