@@ -12,7 +12,7 @@ from table import Row, duration, times
 from timing import Timing, cores_used, in_turns, one_core
 
 from swashplate import Drive, Serial, SquaredError, maneuvers
-from swashplate.drive import PUMP_COLUMNS, bound_drive, drive_instance
+from swashplate.drive import PUMP_COLUMNS, bound_drive
 from swashplate.equations.marching import Observation, ObservedRecord, SignalId, record_of
 from swashplate.equations.marching.run import PlannedMarch, arrays_of
 
@@ -25,7 +25,7 @@ class Kernel:
     """The compiled march of a record, with everything that it reads and writes made beforehand."""
 
     def __init__(self, drive: Drive, signal: str, values: Array) -> None:
-        self.instance = drive_instance(drive.parameters, by_voltage=signal == "voltage")
+        self.instance = drive if signal == "voltage" else drive.by_current
         initial = self.instance.start({signal: float(values[0])}, STEP)
         self.at_rest, self.states = initial.flat, initial.flat.copy()
         kept = ((SignalId(1, "signals", "shaft_speed"), 0),)

@@ -22,7 +22,6 @@ from swashplate import (
     simulate_many,
 )
 from swashplate import batch as batches
-from swashplate.drive import drive_instance
 from swashplate.equations import Machine, Model, Tap, equation, simulate
 from swashplate.equations.code_generation.machine_code import optimised
 from swashplate.equations.marching import CodeForm, SampleCode, output_of
@@ -100,7 +99,7 @@ def test_sets_begin_where_they_are_told_to() -> None:
         run = simulate(Machine(valve, p, given=STROKE), INPUTS, RATE, begin=begin)
         assert np.array_equal(batch.output[k], run["position"])
     many = {"pump.Z10": np.full(3, 12.0), "start.pump.pressure": np.array([0.0, 2e5, 4e5])}
-    parts = drive_instance(Drive.preset("hoist").parameters, by_voltage=False).parts
+    parts = Drive.preset("hoist").by_current.parts
     p = pump_drive.parameters(*(part.p for part in parts))
     options = pump_drive.options(parts[1].options)
     record = {"current": np.full(200, 0.45)}
@@ -161,7 +160,7 @@ def test_outputs_are_streamed_to_files(tmp_path: Path, monkeypatch, per_file: in
 def test_executors_give_the_same(tmp_path: Path) -> None:
     """Of a packaged model, which other processes can import."""
     hoist = Drive.preset("hoist")
-    instance = drive_instance(hoist.parameters, by_voltage=False)
+    instance = hoist.by_current
     current = 0.9 * np.sin(np.arange(300) / 40.0)
     numbers = 1.2e-4 * np.linspace(0.8, 1.2, 20)
     parts = [part.p for part in instance.parts]

@@ -19,7 +19,6 @@ from swashplate.crane.kinematics import (
     to_inertial,
 )
 from swashplate.crane.rope import Hanging, Hung, hanging_load, rope_step, set_off
-from swashplate.drive.instance import drive_instance
 from swashplate.equations import Model, equation, join
 from swashplate.models.drive import drive
 
@@ -129,7 +128,7 @@ class Numbers(NamedTuple):
 
 def numbers_of_drive(axis: str) -> Numbers:
     """Parameters and options of a packaged drive."""
-    parts = drive_instance(Drive.preset(axis).parameters, by_voltage=True).parts
+    parts = Drive.preset(axis).parts
     p = drive.parameters(*(part.p for part in parts))
     return Numbers(p, drive.options(*(part.options for part in parts)))
 

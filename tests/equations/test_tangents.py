@@ -6,7 +6,6 @@ from tests.drive.experiments import ALL
 from tests.equations.tangents import marched
 
 from swashplate import Drive
-from swashplate.drive import drive_instance
 from swashplate.equations import floats_of
 from swashplate.parameters import DEFINITIONS, SWITCHES
 
@@ -29,7 +28,7 @@ def test_columns_are_those_of_tangents(name: str) -> None:
         drive = drive.at_every_rate()
     time = np.arange(SIZE) / RATE
     voltage = 5.3 * np.sin(9.0 * time + 0.7)
-    instance = drive_instance(drive.parameters, by_voltage=True)
+    instance = drive
     run = instance, {"voltage": voltage}, 1.0 / RATE, "shaft_speed"
     values, slopes = marched(*run)
     _, alone = marched(*run, begins=False)

@@ -12,7 +12,7 @@ import pytest
 from tests.marks import rest_slow
 
 from swashplate import Drive, InputError
-from swashplate.drive import Sample, models_of
+from swashplate.drive import Sample
 from swashplate.equations import state_paths
 from swashplate.export import content_of, drive_sources, libraries, values_of
 from swashplate.export.c_source import feedthrough
@@ -251,7 +251,7 @@ def test_a_parameter_changed_on_the_way_is_a_stepper_that_goes_on(
     for name, value in changes.items():
         assert model.set(model.number("", name), value) == OK
     state = stepper.state
-    paths = state_paths(models_of(()).drive)
+    paths = state_paths(hoist.model)
     # the C keeps what terms that are off would need, Python only what its equations read
     for path, value in {"pump.speed": last.shaft_speed, "pump.initialised": 1.0}.items():
         state.context.states[paths.index(path)] = value

@@ -15,7 +15,6 @@ from tests.export.webassembly import Page
 from tests.marks import rest_slow
 
 from swashplate import Drive
-from swashplate.drive import drive_instance
 from swashplate.equations import (
     Machine,
     Model,
@@ -406,7 +405,7 @@ def test_an_fmu_of_two_drives_on_one_load_has_the_bits_of_its_march(
     tmp_path: Path, machine: list[str]
 ) -> None:
     fmpy = pytest.importorskip("fmpy")
-    parts = drive_instance(Drive.preset("hoist").parameters, by_voltage=True).parts
+    parts = Drive.preset("hoist").parts
     winch = drive.parameters(*(part.p for part in parts))
     options = drive.options(*(part.options for part in parts))
     both = tug.options(options, options)

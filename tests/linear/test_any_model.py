@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 
 from swashplate import DomainError, Drive, InputError
-from swashplate.drive import drive_instance
 from swashplate.equations import Machine, Model, Tap, discretised, equation, join
 from swashplate.equations.marching import PartNumbers, SignalId, marched
 from swashplate.linear import LinearModel, linearize
@@ -226,7 +225,7 @@ def test_refusals() -> None:
 @pytest.mark.parametrize("at", [-3.0, 4.0])
 def test_a_drive_as_any_model(hoist: Drive, at: float) -> None:
     own = hoist.linearize(at, outputs=("shaft_speed", "current"), coulomb="tangent").discrete(512.0)
-    instance = drive_instance(hoist.parameters, by_voltage=True)
+    instance = hoist
     model = linearize(instance, {"voltage": at}, 512.0, outputs=("shaft_speed", "current"))
     f = np.array([0.1, 1.0, 20.0])
     np.testing.assert_allclose(model.response(f), own.response(f), rtol=1e-10)

@@ -3,7 +3,6 @@
 import pytest
 
 from swashplate import Drive
-from swashplate.drive import card_of, pump_of
 from swashplate.models.amplifier import CardChannel
 from swashplate.models.displacement_control import Pump
 
@@ -11,10 +10,10 @@ from swashplate.models.displacement_control import Pump
 @pytest.fixture(scope="session")
 def pump(hoist: Drive) -> Pump:
     """The hoist's pump."""
-    return pump_of(hoist.parameters)
+    return hoist.parts[1].p
 
 
 @pytest.fixture(scope="session")
 def channel(hoist: Drive) -> CardChannel:
     """The positive channel of the hoist's card."""
-    return card_of(hoist.parameters).plus
+    return hoist.parts[0].p.plus

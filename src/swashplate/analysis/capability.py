@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, Literal, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from swashplate.drive import Drive, drive_instance
+from swashplate.drive import Drive
 from swashplate.equations import Machine, with_replacements
 from swashplate.equations.marching import SOURCE_RATE, PartNumbers, called
 from swashplate.models.displacement_control import PumpOptions, pressure_limits
@@ -149,14 +149,14 @@ def acceleration_curve(drive: Drive, voltage: float, points: int = 201) -> Accel
 
 def _settled_pressure(drive: Drive, voltage: float) -> float:
     """Stroking pressure that a command settles at. [Pa]"""
-    pump = drive_instance(drive.parameters, by_voltage=False)
+    pump = drive.by_current
     started = pump.start({"current": drive.steady_current(voltage)}, 1.0, "steady")
     return float(started.states[1].pressure)
 
 
 def speed_limits(drive: Drive) -> tuple[float, float]:
     """Lowest and highest speed that the swash plate's stops, or Z15, allow at all. [rad/s]"""
-    instance = drive_instance(drive.parameters, by_voltage=False)
+    instance = drive.by_current
     limits_of = with_replacements(pressure_limits, instance.model.parts[1].replacements)
     limits = limits_of(instance.parts[1].p)
     low, high = _curve(drive, 0.0, np.array([limits.lower, limits.upper])).speed
@@ -180,7 +180,7 @@ def _curve(drive: Drive, voltage: float, pressure: Array) -> AccelerationCurve:
     The speed is that of the plate's angle less what leaks under a load that stands still; what
     leaks while it accelerates is left out.
     """
-    instance = drive_instance(drive.parameters, by_voltage=False)
+    instance = drive.by_current
     front, (p, options, _) = instance.parts
     # a line at rest leaks as a stiff one does
     leaks = options.leakage if options.line is None else options.line

@@ -8,11 +8,6 @@ from .frequency_response import response_table as response_table
 from .instance import PRESSURE_PATH as PRESSURE_PATH
 from .instance import START as START
 from .instance import at_every_rate as at_every_rate
-from .instance import card_of as card_of
-from .instance import card_options as card_options
-from .instance import drive_instance as drive_instance
-from .instance import models_of as models_of
-from .instance import pump_of as pump_of
 from .linear_drive import LinearDrive as LinearDrive
 from .linear_drive import model_tables as model_tables
 from .march import Sample as Sample

@@ -9,7 +9,6 @@ from dataclasses import dataclass
 from functools import lru_cache
 from importlib.resources import files
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,7 +17,6 @@ from swashplate.__about__ import __version__
 from swashplate.drive import (
     Drive,
     Sample,
-    models_of,
 )
 from swashplate.equations import Machine, Model, declared_by
 from swashplate.equations.code_generation import (
@@ -55,12 +53,11 @@ OWN_LICENCE, THIRD_PARTY = "LICENSE.txt", "THIRD_PARTY.txt"
 
 def exported_drive(drive: Drive | None = None) -> Exported:
     """The drive as it is in C; with user-defined equations if the drive has some."""
-    return _exported(() if drive is None else drive.parameters.equations)
+    return _exported(drive_model if drive is None else drive.model)
 
 
 @lru_cache(maxsize=8)
-def _exported(equations: tuple[Any, ...]) -> Exported:
-    model = models_of(equations).drive
+def _exported(model: Model) -> Exported:
     columns = {
         f"{model.prefix(part_index)}{path}": column
         for part_index, part in enumerate(model.parts)

@@ -18,8 +18,6 @@ from swashplate import maneuvers
 from swashplate.drive import (
     UNITS,
     Drive,
-    card_of,
-    card_options,
     drive_records,
 )
 from swashplate.equations import BoundModel, Machine, Run, Sensitivities
@@ -210,8 +208,7 @@ class FullOrderDrive(Machine):
             )
         object.__setattr__(self, "drive", drive)
         object.__setattr__(self, "physical", physical)
-        front = PartNumbers(card_of(drive.parameters), card_options(drive.parameters))
-        self._set(model.full_drive, (front, self._plant_numbers(None)), physical.name)
+        self._set(model.full_drive, (drive.parts[0], self._plant_numbers(None)), physical.name)
 
     def __reduce__(self) -> tuple[type[FullOrderDrive], tuple[Drive, PhysicalSet]]:
         return FullOrderDrive, (self.drive, self.physical)

@@ -27,7 +27,7 @@ from swashplate.crane.rope import (
     swing_of,
     too_fast_sentence,
 )
-from swashplate.drive import Drive, drive_instance
+from swashplate.drive import Drive
 from swashplate.equations import CompiledStep, Machine, StepContext, compiled_step
 from swashplate.equations.marching import marched, stored_of
 from swashplate.errors import DomainError, InputError
@@ -266,7 +266,7 @@ class CraneStepper:
         for i, axis in enumerate(AXES):
             stick = np.ascontiguousarray(commands[:, i])
             volts = loop.open_voltages(stick, self.fixed.inverses[i], self.fixed.actuation)
-            instance = drive_instance(getattr(self._crane, axis).parameters, by_voltage=True)
+            instance = getattr(self._crane, axis)
             start = instance.start({"voltage": 0.0}, h, "rest")
             outputs = stored_of(instance.model, OUTPUTS)
             rows = marched(instance, {"voltage": volts}, h, start, outputs, "command")
