@@ -294,7 +294,7 @@ def march_sets(
     step = next(iter(records.values())).step
     groups = _option_groups(machine, numbers, values, count)
     failures: dict[int, str] = {}
-    for mask, sentence in (*rules, *_step_rules(machine, numbers, groups, step)):
+    for mask, sentence in (*rules, *_step_rules(machine, numbers, values, groups, step)):
         for number in np.flatnonzero(mask):
             failures.setdefault(int(number), f"{name}: {sentence(int(number))}")
     blocks: list[Block] = []
@@ -331,7 +331,7 @@ def _option_groups(
         if any(path in changed for path in full):
             masks[index, option] = np.any([numbers[path] for path in full], axis=0)
     for index, part in enumerate(model.parts):
-        for option, equation in part.follows.items():
+        for option, equation in part.follows.items() if _changes(model, index, changed) else ():
             arguments = {"p": _numbers_of_part(model, index, numbers)}
             masks[index, option] = _over_sets(part, equation, arguments, count) != 0.0
     if not masks:
@@ -347,12 +347,22 @@ def _option_groups(
 
 
 def _step_rules(
-    machine: Machine, numbers: Mapping[str, Array], groups: Sequence[OptionGroup], step: float
+    machine: Machine,
+    numbers: Mapping[str, Array],
+    changed: Collection[str],
+    groups: Sequence[OptionGroup],
+    step: float,
 ) -> Iterator[Broken]:
     """Sets at which a part does not bear the step [s]."""
     model = machine.model
     for index, part in enumerate(model.parts):
-        for group in groups if part.stable is not None else ():
+        if part.stable is None:
+            continue
+        if not _changes(model, index, changed):
+            arguments = {"p": machine.parts[index].p, "h": step, "options": machine.options[index]}
+            if called(part, part.stable, arguments) > 0.0:
+                continue
+        for group in groups:
             p = _numbers_of_part(model, index, numbers)
             options = group.options[index]
             arguments = {"p": p, "h": step, "options": options}
@@ -365,6 +375,12 @@ def _step_rules(
                 return unstable_step(part, PartNumbers(p, options), step)
 
             yield group.sets & ~(margins > 0.0), sentence
+
+
+def _changes(model: Model, index: int, changed: Collection[str]) -> bool:
+    """Whether some of the changed parameters are those of a part."""
+    prefix = model.prefix(index)
+    return any(path.startswith(prefix) for path in changed)
 
 
 def _numbers_of_part(model: Model, index: int, numbers: Mapping[str, Any]) -> Any:

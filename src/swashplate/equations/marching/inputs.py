@@ -69,7 +69,8 @@ def inputs_of(
         needed = ", ".join(model.external) or "an input, but its equations take none"
         raise InputError(f"{machine.name} needs a record of {needed}.")
     rate = in_si(rate, "Hz", "The rate")
-    sampling["time"] = in_si(sampling.get("time"), "s", "The time")
+    if sampling.get("time") is not None:
+        sampling["time"] = in_si(sampling["time"], "s", "The time")
     sampling["substeps"] = substeps_of(model, rate, sampling.get("substeps"))
     samples = {name: _samples(model, name, signal, rate) for name, signal in inputs.items()}
     return {
@@ -87,6 +88,8 @@ def substeps_of(model: Model, rate: float, requested: int | None) -> int | None:
 
 def _samples(model: Model, name: str, signal: ArrayLike | Command, rate: float) -> ArrayLike:
     """Samples of an input in its SI unit."""
+    if isinstance(signal, np.ndarray):  # told sooner than what has a method or a unit
+        return signal
     if isinstance(signal, str):
         raise InputError(
             f"The {name} is the text '{signal}': give samples, or a maneuver such as "
@@ -111,6 +114,8 @@ def within_range(model: Model, name: str, record: Record, *, clip: bool = False)
     """
     definition = model.input_definitions.get(name)
     if definition is None:
+        return record
+    if name not in model.input_ranges and definition.plausible is None:
         return record
     least, most = model.input_ranges.get(name, (-inf, inf))
     values = record.values
