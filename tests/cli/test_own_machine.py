@@ -41,7 +41,7 @@ class Limits(NamedTuple):
     low: bool
 
 
-Volts = Annotated[float, Definition("valve command", "V")]
+Volts = Annotated[float, Definition("valve command", "V", lower=-50.0, upper=50.0)]
 Bias = Annotated[float, Definition("pressure behind the valve", "bar")]
 
 
@@ -326,6 +326,13 @@ def test_an_fmu_answers_as_by_formula(done, own, tmp_path):
     np.testing.assert_allclose(result["level"], expected, atol=1e-8)
 
 
+def test_a_command_beyond_its_range_is_clipped_on_request(done, own):
+    done("simulate", own(), "step:60", *NO_BIAS, "--clip", "--out", "clipped.csv")
+    done("simulate", own(), "step:50", *NO_BIAS, "--out", "within.csv")
+    clipped, within = (pl.read_csv(f"{name}.csv")["level"] for name in ("clipped", "within"))
+    assert (clipped == within).all()
+
+
 # --- refusals -------------------------------------------------------------------------------------
 
 REFUSED = {
@@ -339,7 +346,7 @@ REFUSED = {
     "simulate own_tank.py step:1 --scale start.level=2": "--set start.level=VALUE",
     "simulate own_tank.py step:1 --measured bias=1V": "bias ... 'V'... bar",
     "simulate own_tank.py:pair step:1 --set lag=1": "'lag'; there are left.lag, right.lag",
-    "simulate own_tank.py step:1 --measured bias=0 --clip": "--clip is for a drive",
+    "simulate own_tank.py step:60 --measured bias=0": "60 V at 1 s... within ±50 V",
     "simulate own_tank.py --model own_tank.py step:1": "leave out --model",
     "linearize own_tank.py --at 1": "bias [bar]... --at bias=NUMBER",
     "linearize own_tank.py --at 1 --at bias=0 --output lewel": "no signal 'lewel'; there are level",

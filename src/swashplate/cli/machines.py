@@ -124,12 +124,13 @@ class OwnMachine:
 
     def steps_a_second(self, stated: float | None = None) -> float:
         """Steps of its equations, as many as `simulate` takes, unless others are stated. [Hz]"""
-        from swashplate.equations.marching import SOURCE_RATE, check_rate
+        from swashplate.equations.marching import SOURCE_RATE, check_rate, substeps_of
 
         if stated is not None:
             check_rate(stated)
             return stated
-        return (self.rate or SOURCE_RATE) * (self.substeps or 1)
+        rate = self.rate or SOURCE_RATE
+        return rate * (substeps_of(self.model, rate, self.substeps) or 1)
 
     def table(self) -> Table:
         """Its parameters with their units."""
@@ -436,7 +437,8 @@ def limits_table(own: OwnMachine, run: Run | None = None) -> Table:
         share = [share_cell(float(run.active(name).mean()))] if run is not None else []
         table.add(name, meaning, *share)
     for name, definition in own.model.definitions.items():
-        if definition.range == "any finite number":
+        # an input beyond its range is refused, so that none is ever there
+        if definition.range == "any finite number" or name in own.model.external:
             continue
         share = []
         if run is not None:

@@ -405,7 +405,9 @@ class Simulating(CommandSampling):
     clip: Annotated[
         bool,
         typer.Option(
-            "--clip", metavar=NO_VALUE, help="Clip voltages beyond ±10 V instead of refusing them."
+            "--clip",
+            metavar=NO_VALUE,
+            help="Clip a command beyond its range, of a drive ±10 V, instead of refusing it.",
         ),
     ] = False
     measured: Annotated[

@@ -69,7 +69,6 @@ def at_rate(drive: Drive, rate: float) -> Drive:
 def run_of(machine: MachineChoice, command: str, options: Simulating) -> tuple[str, Run]:
     """Simulate a drive, or a machine of a user's own; return the command's name and the run."""
     if machine.own is not None:
-        machine.refuse(clip=options.clip)
         return own_run(machine.own, command, options)
     return simulated_as(at_rate(machine.loaded_drive, options.rate), command, options)
 
@@ -279,6 +278,7 @@ def own_run(own: OwnMachine, command: str, options: Simulating) -> tuple[str, Ru
         time=time,
         interpolation=options.interpolation,
         substeps=own.substeps,
+        clip=options.clip,
         start=options.start,
         begin=own.begin,
     )
