@@ -23,6 +23,7 @@ from swashplate.equations import (
     check_mapping,
     derive,
     floats_of,
+    near_names,
     nested_from,
     parameter_paths,
     state_paths,
@@ -124,8 +125,9 @@ def simulate_many(
     machine, inputs, rate, **sampling :
         As in `swashplate.equations.simulate`; `time`, `interpolation`, `substeps`.
     changes : mapping of str to (m,) array_like
-        Values of parameters by path, one for each set; the others are those of the machine. With
-        ``start.`` before its path, a number of the state at the first sample, as `begin` of
+        Values of parameters by path, one for each set; the others are those of the machine. The
+        last word of a path is enough where it is unique, and a symbol stands for both directions.
+        With ``start.`` before its path, a number of the state at the first sample, as `begin` of
         `swashplate.equations.simulate`.
     output : str
         The signal to return; with `cost` it is not needed.
@@ -169,13 +171,13 @@ def simulate_many(
     """
     model = machine.model
     records = inputs_of(machine, inputs, rate, **sampling)
-    values, count = set_columns(changes)
-    selectable = (*parameter_paths(model), *(f"start.{path}" for path in state_paths(model)))
-    for path in values:
-        if path not in selectable:
-            raise InputError(
-                f"{model.name} has no parameter '{path}'; it has {', '.join(selectable)}."
-            )
+    columns, count = set_columns(changes)
+    values = dict[str, Array]()
+    for name, column in columns.items():
+        for path in _paths_of(model, name):
+            if path in values:
+                raise InputError(f"{path} is given twice.")
+            values[path] = column
     if cost is None and not output:
         raise InputError(f"{model.name}: name the output of the sets to return, or give a cost.")
     return march_sets(
@@ -189,6 +191,16 @@ def simulate_many(
         to=to,
         executor=executor,
     )
+
+
+def _paths_of(model: Model, name: str) -> tuple[str, ...]:
+    """Paths that a change stands for: parameters, or with ``start.`` a number of the state."""
+    if not name.startswith("start."):
+        return model.parameters_named(name)
+    starts = [f"start.{path}" for path in state_paths(model)]
+    if name not in starts:
+        raise InputError(f"{model.name} has no state {near_names(name, starts)}.")
+    return (name,)
 
 
 def _numbers_of(instance: Machine) -> dict[str, float]:

@@ -257,3 +257,33 @@ def test_signals_of_a_joined_drive_have_meaning_and_unit() -> None:
     assert definitions["one.shaft_speed"].unit == "rad/s"
     assert definitions["two.shaft_position"].unit == "rad"
     assert definitions["two.voltage"].name.startswith("command of the card")
+
+
+def test_derivatives_and_sets_take_the_same_names() -> None:
+    hoist = Drive.preset("hoist")
+    winches = join("winches", {"left": hoist, "right": hoist})
+    voltage = np.where(np.arange(400) > 20, 7.0, 0.0)
+    inputs = {"left.voltage": voltage, "right.voltage": -voltage}
+    by = sensitivities(winches, inputs, 512.0, parameters=["left.pump.Z16", "right.pump.Z1"])
+    assert by.names == ("left.pump.Z16_plus", "left.pump.Z16_minus", "right.pump.Z1")
+    alone = hoist.sensitivities(voltage, 512.0, parameters=["Z16"])
+    np.testing.assert_allclose(
+        by["left.shaft_speed"][:, :2], alone["shaft_speed"], rtol=1e-9, atol=1e-12
+    )
+    assert not by["left.shaft_speed"][:, 2].any()
+    many = simulate_many(
+        winches, {"left.pump.Z16": [2e-4, 3e-4]}, inputs, 512.0, output="left.shaft_speed"
+    )
+    assert many.output is not None
+    expected = hoist.replace(Z16=3e-4).simulate(voltage, 512.0).shaft_speed
+    np.testing.assert_allclose(many.output[1], expected, rtol=0.0, atol=1e-12)
+    with pytest.raises(InputError, match=r"'Z17'; there are left.pump.Z17, right.pump.Z17"):
+        simulate_many(winches, {"Z17": [0.1]}, inputs, 512.0, output="left.shaft_speed")
+    with pytest.raises(InputError, match=r"left.pump.Z16_plus is given twice"):
+        simulate_many(
+            winches,
+            {"left.pump.Z16": [1e-4], "left.pump.Z16_plus": [1e-4]},
+            inputs,
+            512.0,
+            output="left.shaft_speed",
+        )

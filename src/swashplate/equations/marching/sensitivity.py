@@ -16,8 +16,8 @@ from swashplate.equations.marching.observation import RunValues, every_sample
 from swashplate.equations.marching.record import Sampling
 from swashplate.equations.marching.run import Machine, Start, initial_states
 from swashplate.equations.marching.simulation import Run
-from swashplate.equations.model import full_name, parameter_paths
-from swashplate.errors import DomainError, InputError
+from swashplate.equations.model import parameter_paths
+from swashplate.errors import DomainError
 
 Array = NDArray[np.float64]
 R = TypeVar("R", bound=Run, covariant=True)
@@ -103,8 +103,9 @@ def sensitivities(
     machine, inputs, rate, start, begin, **sampling :
         As in `simulate`; `time`, `interpolation`, `substeps`.
     parameters : sequence of str, optional
-        Paths of parameters, or ``start.`` with the path of a state that `begin` names; by default
-        all parameters.
+        Paths of parameters, whose last word is enough where it is unique, symbols for both
+        directions, or ``start.`` with the path of a state that `begin` names; by default all
+        parameters.
 
     Returns
     -------
@@ -121,13 +122,12 @@ def sensitivities(
     run = Run(machine, records, start, begin or {})
     machine.check_step(run.record.step)
     initial_states(machine, run.initial, run.begin)  # refuses what does not fit
-    selectable = (*parameter_paths(model), *(f"start.{path}" for path in run.begin))
     columns = parameter_paths(model)
     if parameters is not None:
-        columns = tuple(full_name(path, selectable) for path in parameters)
-    for path in columns:
-        if path not in selectable:
-            raise InputError(
-                f"{model.name} has no parameter '{path}'; it has {', '.join(selectable) or 'none'}."
-            )
+        starts = [f"start.{path}" for path in run.begin]
+        columns = tuple(
+            path
+            for name in parameters
+            for path in ((name,) if name in starts else model.parameters_named(name))
+        )
     return Sensitivities(run, columns, BoundModel(machine, RunValues(run.begin), columns))
