@@ -415,6 +415,16 @@ def print_faces(imports: Mapping[Module, Sequence[Import]], faces: Faces) -> Non
 
 def print_kinds(imports: Mapping[Module, Sequence[Import]]) -> None:
     """Calls of `isinstance` that ask for one of `KINDS`, by package."""
+    calls, classes = kinds_by_package(imports)
+    print(f"\nQuestions of kind, isinstance with {', '.join(sorted(KINDS))}: {calls.total()}")
+    for package, count in sorted(calls.items()):
+        print(f"  {package:14}{count:6}  {listed(classes[package])}")
+
+
+def kinds_by_package(
+    imports: Mapping[Module, Sequence[Import]],
+) -> tuple[Counter[str], dict[str, Counter[str]]]:
+    """How many calls each package has, and how often they ask for each class."""
     calls = Counter[str]()
     classes: dict[str, Counter[str]] = defaultdict(Counter)
     for module, imported in imports.items():
@@ -422,12 +432,10 @@ def print_kinds(imports: Mapping[Module, Sequence[Import]]) -> None:
         known = own | {each.local: each.name for each in imported}
         for node in ast.walk(module.tree):
             asked = kinds_asked(node, known)
-            calls[module.package] += bool(asked)
-            classes[module.package].update(asked)
-    print(f"\nQuestions of kind, isinstance with {', '.join(sorted(KINDS))}: {calls.total()}")
-    for package, count in sorted(calls.items()):
-        if count:
-            print(f"  {package:14}{count:6}  {listed(classes[package])}")
+            if asked:
+                calls[module.package] += 1
+                classes[module.package].update(asked)
+    return calls, classes
 
 
 def kinds_asked(node: ast.AST, known: Mapping[str, str]) -> set[str]:

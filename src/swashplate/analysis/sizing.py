@@ -15,6 +15,7 @@ from swashplate.drive import Drive
 from swashplate.errors import DomainError, InputError, ParameterError
 from swashplate.parameters import FULL_VOLTAGE
 from swashplate.results import Result
+from swashplate.stopping import as_a_whole
 from swashplate.tables import UNIT, Cell, Column, Table, listed, quantity
 from swashplate.units import display_unit
 
@@ -354,7 +355,10 @@ def smallest_change(slack: Slack, low: Array, high: Array) -> Array | None:
     if _is_met(slack, unchanged):
         return unchanged
     # a quarter of the sequence's range lies beyond each side of the box: faces and corners
-    inner = np.clip(2.0 * Sobol(low.size, scramble=False).random_base2(SCANNED) - 0.5, 0.0, 1.0)
+    # its numbers are read within a callback of C, which would drop what a signal raises
+    with as_a_whole():
+        scanned = Sobol(low.size, scramble=False).random_base2(SCANNED)
+    inner = np.clip(2.0 * scanned - 0.5, 0.0, 1.0)
     points = [low, high, *(low + inner * (high - low))]
     for k in range(low.size):
         factor = smallest_single(slack, low, high, k)

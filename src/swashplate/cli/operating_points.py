@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from math import inf, pi
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING
 
 from swashplate.cli.machines import OwnMachine, without_empty
 from swashplate.errors import DomainError, InputError
@@ -15,102 +15,26 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
-    from swashplate.linear import LinearModel
+    from swashplate.linear import LinearModel, SettledPoint
 
     Array = NDArray[np.float64]
-FIRST, LONGEST = 1.0, 1024.0
-"""Time after which a machine may have settled, and must have. [s]"""
-SETTLED, STEADY = 1e-9, 1e-6
-"""Change of a state over its size that counts as none, and change of its rate over the rate. [1]"""
 AT_ZERO = 1e-9
 """Size of a sampled pole, or distance of it from 1, that counts as 0. [1]"""
 
 
-class MachinePoint(NamedTuple):
-    """States under constant inputs."""
-
-    states: Array
-    """All states in the order of `state_paths`."""
-    rates: Array
-    """By which those change that go on, as a position under a constant speed does; else 0. [1/s]"""
-    by_equation: bool = False
-    """Whether the model's own equation gives them."""
-
-
-def operating_point(own: OwnMachine, at: Mapping[str, float], rate: float) -> MachinePoint:
+def operating_point(own: OwnMachine, at: Mapping[str, float], rate: float) -> SettledPoint:
     """States that a machine settles at under constant inputs, in steps of a rate [Hz].
 
-    Those that the command line sets, if it sets any; else those of the model's own equation, or
-    where a march from the start ends once nothing changes but at a constant rate.
+    Those that the command line sets, if it sets any.
     """
     import numpy as np
 
-    from swashplate.equations import floats_of, state_paths
+    from swashplate.linear import SettledPoint, settle, states_at_start
 
-    machine = own.machine
-    settles = all(part.settled or not floats_of(part.state) for part in machine.model.parts)
-    if settles and not own.stated:
-        states = machine.start(at, 1.0 / rate, "steady").flat
-        return MachinePoint(states, np.zeros(states.size), by_equation=True)
-    states = machine.start(at, 1.0 / rate, "rest").flat
-    for path, value in own.begin.items():
-        states[state_paths(machine.model).index(path)] = value
     if own.stated:
-        return MachinePoint(states, np.zeros(states.size))
-    return _marched_point(own, at, rate, states)
-
-
-def _marched_point(
-    own: OwnMachine, at: Mapping[str, float], rate: float, begin: Array
-) -> MachinePoint:
-    """Where a march under constant inputs ends."""
-    import numpy as np
-
-    from swashplate.equations import stepper
-
-    model = own.machine.model
-    # all signals: a state that none of the outputs needs is not marched
-    walker = stepper(own.machine, [*at], model.every_signal, rate=rate)
-
-    def put(states: Array) -> None:
-        kept = walker.state
-        kept.context.states[:] = states
-        walker.state = kept
-
-    def gone(steps: int) -> tuple[Array, Array]:
-        """States after some steps, and their change in the next one."""
-        for _ in range(steps):
-            walker.step(*at.values())
-        before = walker.state.context.states.copy()
-        walker.step(*at.values())
-        return before, walker.state.context.states - before
-
-    put(begin)
-    steps = round(FIRST * rate)
-    states, change = gone(steps)
-    while steps < LONGEST * rate:
-        earlier, earlier_change = states, change
-        states, change = gone(steps)
-        still = np.abs(states - earlier) <= SETTLED * np.maximum(np.abs(states), 1e-30)
-        steady = np.abs(change - earlier_change) <= STEADY * np.abs(change)
-        if (still | steady).all():
-            break
-        steps *= 2
-    else:
-        raise DomainError(
-            f"{own.machine.name} does not settle within {LONGEST:g} s under these inputs: give the "
-            "states of the operating point by --set start.PATH=VALUE."
-        )
-    rates = np.where(still, 0.0, change * rate)
-    # a position goes on from where it begins, unless another state goes on with it
-    from_start = np.where(still, states, begin)
-    put(from_start)
-    _, again = gone(0)
-    if np.abs(again - np.where(still, 0.0, change)).max(initial=0.0) <= STEADY * np.abs(change).max(
-        initial=0.0
-    ) + SETTLED * np.abs(states).max(initial=0.0):
-        states = from_start
-    return MachinePoint(states, rates)
+        states = states_at_start(own.machine, at, rate, own.begin)
+        return SettledPoint(own.machine, states, np.zeros(states.size))
+    return settle(own.machine, at, rate, begin=own.begin)
 
 
 def rates_under(own: OwnMachine, at: Mapping[str, float], rate: float) -> dict[str, float]:
@@ -131,22 +55,15 @@ def linear_model(
     own: OwnMachine,
     at: Mapping[str, float],
     rate: float,
-    point: MachinePoint,
+    point: SettledPoint,
     *,
     inputs: Sequence[str] | None = None,
     outputs: Sequence[str] | None = None,
 ) -> LinearModel:
     """A machine's step, linearised at an operating point."""
-    from swashplate.equations import floats_of, tuple_from
     from swashplate.linear import linearize
 
-    states: list[Any] | None = None
-    if not point.by_equation:
-        numbers = iter(point.states.tolist())
-        states = [
-            tuple_from(part.state, {path: next(numbers) for path in floats_of(part.state)})
-            for part in own.model.parts
-        ]
+    states = None if point.by_equation else point.states
     return linearize(own.machine, at, rate, states=states, inputs=inputs, outputs=outputs)
 
 
@@ -162,7 +79,7 @@ def outputs_named(own: OwnMachine, names: Sequence[str] | None) -> list[str] | N
 def linear_tables(
     own: OwnMachine,
     at: Mapping[str, float],
-    point: MachinePoint,
+    point: SettledPoint,
     model: LinearModel,
     frequency: float,
 ) -> list[Table]:
@@ -170,7 +87,7 @@ def linear_tables(
     return [_point_table(own, at, point), _gains_table(own, model, frequency), poles_table(model)]
 
 
-def _point_table(own: OwnMachine, at: Mapping[str, float], point: MachinePoint) -> Table:
+def _point_table(own: OwnMachine, at: Mapping[str, float], point: SettledPoint) -> Table:
     from swashplate.equations import state_paths
 
     columns = (Column("Operating point"), Column("is"), Column("", ".5g"), Column("unit"))
@@ -178,7 +95,7 @@ def _point_table(own: OwnMachine, at: Mapping[str, float], point: MachinePoint) 
     for name, value in at.items():
         table.add(name, "input", value, unit_text(own.unit(name)), "")
     signals = _signals_of_states(own)
-    rows = zip(state_paths(own.model), signals, point.states, point.rates, strict=True)
+    rows = zip(state_paths(own.model), signals, point.flat, point.rates, strict=True)
     for path, signal, value, rate in rows:
         unit = unit_text(own.unit(signal))
         goes_on = f"by {rate:.5g} {unit}/s".replace(" /s", " 1/s") if rate else ""

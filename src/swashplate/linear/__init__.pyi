@@ -10,3 +10,7 @@ from .model import LoopMargins as LoopMargins
 from .model import Matrices as Matrices
 from .model import loop_margins as loop_margins
 from .model import with_delay_line as with_delay_line
+from .settling import SettledPoint as SettledPoint
+from .settling import settle as settle
+from .settling import settles_by_equation as settles_by_equation
+from .settling import states_at_start as states_at_start

@@ -14,10 +14,11 @@ from typing import TYPE_CHECKING, cast, overload
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from swashplate.equations import Machine, floats_of, is_real
+from swashplate.equations import Machine, is_real
 from swashplate.equations.marching import check_rate, marched, output_of
 from swashplate.errors import DomainError, InputError
 from swashplate.linear.model import LinearModel
+from swashplate.linear.settling import settles_by_equation
 from swashplate.results import GivenAxes, Tabular, figures
 from swashplate.tables import Column, Table
 
@@ -368,7 +369,7 @@ def _cycles(
     """Answer to a moving input from its first sample on, a row for each cycle."""
     ((input, record),) = moving.items()
     records = {**moving, **{name: np.full(record.size, value) for name, value in at.items()}}
-    settles = all(part.settled or not floats_of(part.state) for part in instance.model.parts)
+    settles = settles_by_equation(instance)
     first = {name: float(values[0]) for name, values in records.items()}
     initial = instance.start(first, step, "steady" if settles else "rest")
     stored, _ = output_of(instance.model, output)

@@ -21,6 +21,7 @@ from swashplate.equations.marching import (
 )
 from swashplate.errors import DomainError, InputError
 from swashplate.linear.model import LinearModel
+from swashplate.linear.settling import settle, settles_by_equation
 
 Array = NDArray[np.float64]
 
@@ -46,8 +47,8 @@ def linearize(
         Steps a second of a sampled model. None if the model is in continuous time: its step then
         returns the rates of its states, and its taps have no delay. [Hz]
     states : sequence, optional
-        State of each part; by default the one that the model settles at, one sample after the
-        start. In continuous time they must be given.
+        State of each part; by default the one that the model settles at, see `settle`. In
+        continuous time they must be given.
     inputs : sequence of str, optional
         External signals that move, of `at`; by default all of them.
     outputs : sequence of str, optional
@@ -62,9 +63,9 @@ def linearize(
     Raises
     ------
     InputError
-        If a signal is unknown, or the model cannot settle by itself.
+        If a signal is unknown.
     DomainError
-        If the point lies outside the model's domain.
+        If the point lies outside the model's domain, or nothing settles.
 
     Examples
     --------
@@ -103,13 +104,13 @@ def linearize(
             f"{instance.name}: states are {states!r}, but must be a tuple of one "
             f"{' and one '.join(kind.__name__ for kind in kinds)} of finite numbers."
         )
-    if states is None and rate is None:
-        raise InputError(
-            f"{instance.name}: a model in continuous time is linearised at given states; give "
-            "states=[...], one of each part."
-        )
     if states is None:
-        states = _settled_states(instance, at, h)
+        if rate is None:
+            raise InputError(
+                f"{instance.name}: a model in continuous time is linearised at given states; give "
+                "states=[...], one of each part."
+            )
+        states = _settled_states(instance, at, rate)
     initial = instance.start(at, h, "steady", states)
     last = model.parts[-1]
     usual = tuple(model.outputs) or tuple(map(last.full, last.outputs))
@@ -130,22 +131,15 @@ def _check_point(instance: Machine, at: Mapping[str, float], rate: float | None)
             raise InputError(f"{instance.name}: {name} is {value!r}, but must be a finite number.")
 
 
-def _settled_states(instance: Machine, at: Mapping[str, float], h: float) -> list[Any]:
-    """State of each part that the model settles at, one sample after the start."""
-    model = instance.model
-    for part in model.parts:
-        if part.settled is None and floats_of(part.state):
-            states = ", ".join(f"{part.state.__name__}(...)" for part in model.parts)
-            raise InputError(
-                f"{instance.name}: {part.name} has no equation for its steady state "
-                "('settled'); give the states of the operating point: "
-                f"states=[{states}]."
-            )
+def _settled_states(instance: Machine, at: Mapping[str, float], rate: float) -> Sequence[Any]:
+    """State of each part that the machine settles at; by its equations, one sample later."""
+    if not settles_by_equation(instance):
+        return settle(instance, at, rate).states
     # what belongs to the first sample alone has passed
-    arguments = instance.start(at, h, "steady").arguments
+    arguments = instance.start(at, 1.0 / rate, "steady").arguments
     return [
         called(part, part.step, arguments_of_part)
-        for part, arguments_of_part in zip(model.parts, arguments, strict=True)
+        for part, arguments_of_part in zip(instance.model.parts, arguments, strict=True)
     ]
 
 

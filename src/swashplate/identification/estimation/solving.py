@@ -19,6 +19,7 @@ from swashplate.identification.estimation.problem import Evaluation, Loss, Probl
 from swashplate.identification.estimation.unknowns import Vector
 from swashplate.progress import counted
 from swashplate.results import Result
+from swashplate.stopping import as_a_whole
 from swashplate.tables import count, made_folder, write_text
 
 Array = NDArray[np.float64]
@@ -345,7 +346,9 @@ def sobol_starts(problem: Problem, count: int, seed: int) -> Iterator[Array]:
     from scipy.stats.qmc import Sobol
 
     low, high = problem.bounds
-    sequence = Sobol(low.size, scramble=True, rng=np.random.default_rng(seed))
+    # its numbers are read within a callback of C, which would drop what a signal raises
+    with as_a_whole():
+        sequence = Sobol(low.size, scramble=True, rng=np.random.default_rng(seed))
     usable = 0
     tried = 0
     while usable < count:
