@@ -148,6 +148,7 @@ UNSTABLE = Machine(valve, Valve(lag=0.004))
         lambda: simulate(UNSTABLE, {"command": np.ones(9)}, RATE),
         lambda: sensitivities(UNSTABLE, {"command": np.ones(9)}, RATE),
         lambda: stepper(UNSTABLE, ["command"], rate=RATE),
+        lambda: linearize(UNSTABLE, {"command": 1.0}, RATE),
         lambda: sweep(UNSTABLE, [1.0], [1.0], RATE, input="command", output="flow"),
     ],
 )
@@ -179,6 +180,7 @@ def test_numbers_are_replaced_by_path_or_by_a_last_word_that_is_unique() -> None
     wider = pair.replace({"left.gain": 1.0})
     assert wider.params.tolist() == [0.05, 1.0, 0.0, 0.05, 0.5, 0.0]
     assert pair.params.tolist() == [0.05, 0.5, 0.0, 0.05, 0.5, 0.0]
+    assert quick.replace(lag=60.0 * UNITS.ms).params[0] == pytest.approx(0.06, rel=1e-12)
     assert quick.replace(gain=1.0).params.tolist() == [0.05, 1.0, 0.0]
     with pytest.raises(InputError, match=r"'gain'; there are left.gain, right.gain"):
         pair.replace(gain=1.0)

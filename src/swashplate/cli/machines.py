@@ -300,16 +300,10 @@ def numbers_of(machine: Machine) -> dict[str, float]:
 
 def parameter_definitions(own: OwnMachine) -> dict[str, NumberDefinition]:
     """Meaning and unit of each parameter, by path."""
-    from swashplate.equations import declared_by
-
-    definitions = {
-        f"{own.model.prefix(index)}{path}": NumberDefinition(
-            "" if definition.name == path else definition.name, definition.unit
-        )
-        for index, part in enumerate(own.model.parts)
-        for definition in declared_by(part.parameters)
-        for path in definition.fields
-    }
+    definitions = dict[str, NumberDefinition]()
+    for path, definition in own.model.parameter_definitions.items():
+        is_stated = definition.name != path.rpartition(".")[2]
+        definitions[path] = NumberDefinition(definition.name if is_stated else "", definition.unit)
     for path, unit in own.units.items():
         if path in definitions and unit:
             definitions[path] = definitions[path]._replace(unit=unit)

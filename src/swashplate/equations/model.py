@@ -392,6 +392,16 @@ class Model:
         return {name: ends for name, ends in ranges.items() if ends != (-inf, inf)}
 
     @cached_property
+    def parameter_definitions(self) -> dict[str, Definition]:
+        """Definition of each parameter, by path; one that its type does not state has no unit."""
+        return {
+            f"{self.prefix(index)}{path}": definition
+            for index, part in enumerate(self.parts)
+            for definition in declared_by(part.parameters)
+            for path in definition.fields
+        }
+
+    @cached_property
     def parameter_names(self) -> dict[str, tuple[str, ...]]:
         """Paths of the parameters that each name stands for, in the whole model.
 

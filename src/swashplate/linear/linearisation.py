@@ -63,7 +63,7 @@ def linearize(
     Raises
     ------
     InputError
-        If a signal is unknown.
+        If a signal is unknown, or the equations are unstable at the rate.
     DomainError
         If the point lies outside the model's domain, or nothing settles.
 
@@ -111,6 +111,8 @@ def linearize(
                 "states=[...], one of each part."
             )
         states = _settled_states(instance, at, rate)
+    if rate is not None:
+        instance.check_step(h)
     initial = instance.start(at, h, "steady", states)
     last = model.parts[-1]
     usual = tuple(model.outputs) or tuple(map(last.full, last.outputs))

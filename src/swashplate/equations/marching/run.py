@@ -197,11 +197,11 @@ class Machine:
             raise InputError(f"{self.name}: {name} takes {len(paths)} numbers, not {len(values)}.")
         changed = dict[str, float]()
         for path, value in zip(paths, values, strict=True):
-            definition = self.model.ranges.get(path)
-            number = value if definition is None else in_si(value, definition.unit, name)
+            definition = self.model.parameter_definitions[path]
+            number = in_si(value, definition.unit, name) if definition.unit else value
             if not is_real(number):
                 raise InputError(f"{self.name}: {path} is {value!r}, but must be a number.")
-            if definition is not None and not definition.holds(number):
+            if not definition.holds(number):
                 raise ParameterError(f"{self.name}: {definition.broken(path, number)}.")
             changed[path] = float(number)
         return changed
