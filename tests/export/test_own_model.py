@@ -4,7 +4,7 @@ import shutil
 import subprocess
 from math import floor, tanh
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 import pytest
@@ -16,6 +16,7 @@ from tests.marks import rest_slow
 
 from swashplate import Drive
 from swashplate.equations import (
+    Definition,
     Machine,
     Model,
     Tap,
@@ -27,7 +28,7 @@ from swashplate.equations import (
     root,
     simulate,
 )
-from swashplate.errors import EquationError
+from swashplate.errors import EquationError, InputError
 from swashplate.export import c, compare, content_of, drive_sources, fmu, libraries, values_of, wasm
 from swashplate.export.c_source import Exported, interface
 from swashplate.models import displacement_control
@@ -154,6 +155,57 @@ def test_roots_tables_loops_and_options_have_the_bits_of_the_march(
         assert model.step(float(PUMPED[n])) == 0
         assert [model.output(place) for place in places] == [run[name][n] for name in NAMES]
     assert np.ptp(run["level"]) > 0.1
+
+
+class Inertia(NamedTuple):
+    lag: float = 0.1
+
+
+class Filtered(NamedTuple):
+    value: float = 0.0
+
+
+Supply = Annotated[float, Definition("supply pressure", "bar", lower=0.0, upper=200.0)]
+Return = Annotated[float, Definition("return pressure", "bar", lower=1.0)]
+
+
+@equation
+def filtered(state: Filtered, supply: Supply, back: Return, p: Inertia, h: float) -> Filtered:
+    return Filtered(state.value + h / p.lag * (supply - back - state.value))
+
+
+@equation
+def euler_margin(p: Inertia, h: float) -> float:
+    return 2.0 - h / p.lag
+
+
+def test_c_refuses_what_the_march_refuses(compiled: Any) -> None:
+    """Inputs beyond their ranges, steps that are too long, and parameters that make them so."""
+    ok, bad_value, unstable = range(3)
+    model = Model("filter", Inertia, Filtered, filtered, stable=euler_margin, longest_step=0.01)
+    machine = Machine(model, Inertia())
+    with pytest.raises(InputError, match=r"step is 0\.02 s, .* at most 1/100 s"):
+        content_of(machine, 0.02)
+    content = content_of(machine, 0.01, prefix="filter")
+    in_c = InC(compiled(interface(content.exported)), "filter", content.values)
+    steps = {(100.0, 2.0): ok, (-1.0, 2.0): bad_value, (201.0, 2.0): bad_value}
+    steps |= {(1.0, 0.5): bad_value, (200.0, 1.0): ok}
+    for pressures, status in steps.items():
+        assert in_c.step(*pressures) == status, pressures
+        if status == ok:
+            continue
+        records = {
+            name: np.full(3, value)
+            for name, value in zip(("supply", "back"), pressures, strict=True)
+        }
+        with pytest.raises(InputError, match="pressure"):
+            simulate(machine, records, 100.0)
+    assert in_c.set(in_c.number("", "lag"), 0.004) == ok
+    assert in_c.step(100.0, 2.0) == unstable
+    with pytest.raises(InputError, match="unstable"):
+        simulate(machine.replace(lag=0.004), {"supply": np.ones(3), "back": np.ones(3)}, 100.0)
+    header, _ = interface(content.exported).values()
+    assert "supply pressure [bar], 0 to 200" in header
 
 
 class Oil(NamedTuple):

@@ -41,7 +41,7 @@ from swashplate.equations.marching import CodeForm, SampleCode, output_of
 from swashplate.export.c_source.exported import Exported
 from swashplate.export.c_source.layout import Layout, path_of
 from swashplate.export.c_source.parts import PartInC
-from swashplate.export.c_source.structs import notes_of, struct
+from swashplate.export.c_source.structs import noted, notes_of, struct
 
 Array = NDArray[np.float64]
 
@@ -271,6 +271,8 @@ class Writer:
         """What an external signal is."""
         if name in self.exported.notes:
             return self.exported.notes[name]
+        if name in self.model.input_definitions:
+            return noted(self.model.input_definitions[name])
         for part in self.model.parts:
             for input_name in part.input_types:
                 if part.tap(input_name).signal == name and part.inputs is not None:
