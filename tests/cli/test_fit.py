@@ -16,7 +16,7 @@ from math import exp
 from pathlib import Path
 
 import pytest
-from tests.cli.conftest import STEPS, stages
+from tests.cli.conftest import STEPS, stages, without_resource_warnings
 from tests.shown import check_shown
 
 import swashplate
@@ -127,6 +127,7 @@ def test_an_interrupted_search_goes_on(campaign: Path, tmp_path: Path, how: sign
     running = subprocess.Popen(
         [*command, "fitted", "--jobs", "1" if how == signal.SIGKILL else "2"],
         cwd=tmp_path,
+        env=without_resource_warnings(),
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         text=True,
