@@ -8,10 +8,9 @@ from contextlib import redirect_stdout
 from dataclasses import dataclass, field, replace
 from math import isnan
 from pathlib import Path
-from typing import TYPE_CHECKING, NamedTuple, get_type_hints
+from typing import TYPE_CHECKING, NamedTuple, cast, get_type_hints
 
-from swashplate.cli.parsing import NUMBERS, MachineWord, assignments_of
-from swashplate.documents import parse_toml, read_text
+from swashplate.cli.parsing import MachineWord, assignments_of, fitted_numbers
 from swashplate.errors import InputError, UnknownNameError
 from swashplate.tables import UNIT, Column, Table, share_cell
 from swashplate.units import unit_text
@@ -19,7 +18,7 @@ from swashplate.units import unit_text
 if TYPE_CHECKING:
     from types import ModuleType
 
-    from swashplate.drive import Drive
+    from swashplate.drive import Drive, Simulation
     from swashplate.equations import Machine, Model, Run
     from swashplate.identification import ModelSetup, UserModel
 
@@ -151,8 +150,9 @@ class OwnMachine:
         model = self.model
         states = {part.full(path) for part in model.parts for path in floats_of(part.state)}
         for name in dict.fromkeys((*model.external, *model.every_signal, *model.integrals)):
-            is_input = name in model.external
-            what = "input" if is_input else "state" if name in states else "signal"
+            what = "state" if name in states else "signal"
+            if name in model.external:
+                what = "input"
             table.add(name, what, self.meaning(name), unit=self.unit(name))
         return without_empty(table)
 
@@ -268,26 +268,6 @@ def fitted_setup(model: Path, fitted: str | None) -> ModelSetup:
     return replace(setup, free=free)
 
 
-def fitted_numbers(word: MachineWord, setup: ModelSetup, needed: Sequence[str]) -> dict[str, float]:
-    """Numbers in the folder of a fit, those of single runs apart."""
-    from swashplate.equations import is_real
-
-    folder = Path(word.fitted)
-    file = folder / NUMBERS if folder.is_dir() else folder
-    table = parse_toml(read_text(file), str(file)).get(setup.name)
-    if not isinstance(table, dict) or not set(needed) <= table.keys():
-        raise InputError(
-            f"{file} has no table [{setup.name}] with {', '.join(needed)}: give the folder that "
-            f"'swashplate fit --model {word.file}' wrote."
-        )
-    for name, value in table.items():
-        if isinstance(value, bool) or not is_real(value):
-            raise InputError(
-                f"{file}: {name} under [{setup.name}] is {value!r:.60}, which is not a number."
-            )
-    return {name: float(value) for name, value in table.items()}
-
-
 # --- changes --------------------------------------------------------------------------------------
 
 
@@ -392,8 +372,7 @@ def run_tables(own: OwnMachine | None, run: Run) -> list[Table]:
     A run that has tables of its own, as that of a drive, shows these.
     """
     if own is None:
-        tables: list[Table] = [*run.tables()]  # type: ignore[attr-defined]  # of a Simulation
-        return tables
+        return [*cast("Simulation", run).tables()]
     columns = (
         Column("signal"),
         Column("meaning", wrap=True),

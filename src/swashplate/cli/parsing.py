@@ -185,26 +185,37 @@ def parameters_of(word: str) -> ParameterSet:
 
 def model_parameters_of(folder: str, file: Path, runs: Sequence[Experiment]) -> ModelSetup:
     """Read a user-defined model from its file, and its numbers from the folder of its fit."""
-    from swashplate.equations import is_real
     from swashplate.identification import ModelSetup
 
     setup = ModelSetup.from_file(file)
-    numbers_file = Path(folder) / NUMBERS if Path(folder).is_dir() else Path(folder)
-    tables = parse_toml(read_text(numbers_file), str(numbers_file))
-    table = tables.get(setup.name)
     nominal = setup.nominal(runs)
-    if not isinstance(table, dict) or table.keys() != nominal.numbers.keys():
+    word = MachineWord(file, fitted=folder)
+    numbers = fitted_numbers(word, setup, nominal.numbers.keys(), others=False)
+    return replace(nominal, numbers=numbers)
+
+
+def fitted_numbers(
+    word: MachineWord, setup: ModelSetup, needed: Collection[str], *, others: bool = True
+) -> dict[str, float]:
+    """Numbers in the folder of a fit, which must have those needed; `others` may be there, too."""
+    from swashplate.equations import is_real
+
+    folder = Path(word.fitted)
+    file = folder / NUMBERS if folder.is_dir() else folder
+    table = parse_toml(read_text(file), str(file)).get(setup.name)
+    names = set(table) if isinstance(table, dict) else set[str]()
+    is_whole = set(needed) <= names if others else set(needed) == names
+    if not isinstance(table, dict) or not is_whole:
         raise InputError(
-            f"{numbers_file} has no table [{setup.name}] with {', '.join(nominal.numbers)}: give "
-            f"the folder that 'swashplate fit --model {file}' wrote."
+            f"{file} has no table [{setup.name}] with {', '.join(needed)}: give the folder that "
+            f"'swashplate fit --model {word.file}' wrote."
         )
     for name, value in table.items():
         if isinstance(value, bool) or not is_real(value):
             raise InputError(
-                f"{numbers_file}: {name} under [{setup.name}] is {value!r:.60}, which is not a "
-                "number."
+                f"{file}: {name} under [{setup.name}] is {value!r:.60}, which is not a number."
             )
-    return replace(nominal, numbers={name: float(value) for name, value in table.items()})
+    return {name: float(value) for name, value in table.items()}
 
 
 def verdict_of_fit(word: str, numbers: Mapping[str, float]) -> Verdict | None:
