@@ -5,8 +5,8 @@ Beside the machine's equations it knows nothing: bounds and initial values are r
 
 from typing import NamedTuple
 
-from swashplate.equations import Model, discretised, equation
 from swashplate.identification import UserModel
+from swashplate.machine import Model, discretised, equation
 
 
 class Cylinder(NamedTuple):

@@ -12,7 +12,7 @@ from timing import Timing, in_turns, one_core
 
 from swashplate import Drive
 from swashplate.drive import ALL_COLUMNS, PUMP_COLUMNS, bound_drive
-from swashplate.equations.marching import Observation, ObservedRecord, record_of
+from swashplate.machine.marching import Observation, ObservedRecord, record_of
 from swashplate.maneuvers import source_tests
 from swashplate.parameters import DEFINITIONS
 

@@ -15,15 +15,15 @@ import polars as pl
 from numpy.typing import NDArray
 
 from swashplate import maneuvers
-from swashplate.equations.marching import (
+from swashplate.full_order import FullOrderDrive, compare
+from swashplate.full_order import validity as validity_of
+from swashplate.machine.marching import (
     Observation,
     ObservedRecord,
     jacobian,
     record_of,
     residuals,
 )
-from swashplate.full_order import FullOrderDrive, compare
-from swashplate.full_order import validity as validity_of
 
 DOCUMENT = Path(__file__).parent.parent / "docs" / "full-order.md"
 CASES = {

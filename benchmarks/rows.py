@@ -13,8 +13,8 @@ from timing import Timing, cores_used, in_turns, one_core
 
 from swashplate import Drive, Serial, SquaredError, maneuvers
 from swashplate.drive import PUMP_COLUMNS, bound_drive
-from swashplate.equations.marching import Observation, ObservedRecord, SignalId, record_of
-from swashplate.equations.marching.run import PlannedMarch, arrays_of
+from swashplate.machine.marching import Observation, ObservedRecord, SignalId, record_of
+from swashplate.machine.marching.run import PlannedMarch, arrays_of
 
 Array = NDArray[np.float64]
 

@@ -15,8 +15,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from swashplate import Campaign, Experiment
-from swashplate.equations import Model, discretised, equation
+from swashplate import Campaign, Experiment, Model, discretised, equation
 from swashplate.identification import (
     Problem,
     Unknown,

@@ -16,8 +16,7 @@ from typing import NamedTuple
 import numpy as np
 from matplotlib.figure import Figure
 
-from swashplate import Campaign, Channel, Experiment
-from swashplate.equations import Model, Tap, equation
+from swashplate import Campaign, Channel, Experiment, Model, Tap, equation
 from swashplate.identification import (
     Problem,
     Unknown,

@@ -17,8 +17,7 @@ import numpy as np
 from matplotlib.figure import Figure
 from scipy.stats import t as student
 
-from swashplate import Campaign, Channel, Drive, Experiment
-from swashplate.equations import Model, Tap, equation
+from swashplate import Campaign, Channel, Drive, Experiment, Model, Tap, equation
 from swashplate.identification import (
     DriveModel,
     Prior,

@@ -13,9 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from swashplate import Drive, Machine, export
-from swashplate.equations import Model, equation, join, simulate
-from swashplate.linear import linearize
+from swashplate import Drive, Machine, Model, equation, export, join, linearize, simulate
 
 parser = argparse.ArgumentParser(description="Two winches pull a barge.")
 parser.add_argument("--figure", metavar="FILE", help="draw the run")

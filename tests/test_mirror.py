@@ -14,24 +14,24 @@ __getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)
 """
 FILES = {
     "__init__.py": LAZY,
-    "__init__.pyi": "from .equations import Model as Model\n",
+    "__init__.pyi": "from .machine import Model as Model\n",
     "__main__.py": "from swashplate.cli import main\nmain()\n",
     "errors.py": "class InputError(Exception): ...\n",
-    "equations/__init__.py": LAZY,
-    "equations/__init__.pyi": (
+    "machine/__init__.py": LAZY,
+    "machine/__init__.pyi": (
         "from . import graph as graph\n"
         "from .gone import nowhere as nowhere\n"
         "from .marching import Machine as Machine\n"
         "from .model import Model as Model\n"
         "from .model import equation as equation\n"
     ),
-    "equations/graph.py": "",
-    "equations/model.py": "class Model: ...\ndef equation(): ...\n",
-    "equations/marching/__init__.py": LAZY,
-    "equations/marching/__init__.pyi": "from .run import Machine as Machine\n",
-    "equations/marching/run.py": (
+    "machine/graph.py": "",
+    "machine/model.py": "class Model: ...\ndef equation(): ...\n",
+    "machine/marching/__init__.py": LAZY,
+    "machine/marching/__init__.pyi": "from .run import Machine as Machine\n",
+    "machine/marching/run.py": (
         "from typing import TYPE_CHECKING\n"
-        "from swashplate.equations.model import Model\n"
+        "from swashplate.machine.model import Model\n"
         "if TYPE_CHECKING:\n"
         "    from swashplate.cli import main\n"
         "class Machine:\n"
@@ -41,10 +41,10 @@ FILES = {
     "cli/__init__.py": "from swashplate.cli.commands import main as main\n",
     "cli/commands.py": (
         "from typing import TYPE_CHECKING\n"
-        "from swashplate.equations import Machine, graph, Model as Equations\n"
-        "from swashplate.equations.marching import Machine as Again\n"
+        "from swashplate.machine import Machine, graph, Model as Equations\n"
+        "from swashplate.machine.marching import Machine as Again\n"
         "if TYPE_CHECKING:\n"
-        "    from swashplate.equations import nowhere\n"
+        "    from swashplate.machine import nowhere\n"
         "def asked(what):\n"
         "    return isinstance(what, Equations | Again) or isinstance(what, (int, str))\n"
         "def main():\n"
@@ -79,13 +79,13 @@ def test_names_are_counted_where_they_stand(tree: Path, capsys: pytest.CaptureFi
     assert main(["--tree", str(tree)]) == 0
     printed = capsys.readouterr().out
     faces = rows(printed, "Faces")
-    assert faces["equations"] == ["5", "3", "3"]  # Machine, graph, Model of three modules
+    assert faces["machine"] == ["5", "3", "3"]  # Machine, graph, Model of three modules
     assert faces["cli"] == ["0", "1", "1"]
     assert faces["(top)"] == ["1", "0", "0"]
-    assert "equations.marching 1" in printed
+    assert "machine.marching 1" in printed
     kinds = rows(printed, "Questions of kind")
     assert kinds["cli"] == ["1", "Machine", "1,", "Model", "1"]
-    assert kinds["equations"] == ["1", "Model", "1"]
+    assert kinds["machine"] == ["1", "Model", "1"]
     assert rows(printed, "Circles of modules: 1")
     assert rows(printed, "Circles of packages: 1")
 

@@ -13,11 +13,10 @@ ASKED = {
     "cli": (5, "a file of one's own holds a Machine, a Drive, a Model or a UserModel: the door"),
     "crane": (3, "an axis takes a Drive, or the name, file or fit of one"),
     "drive": (1, "what is equal to a drive is one"),
-    "equations": (2, "join takes models or machines"),
     "export": (4, "the door, and a drive's value references, which never change"),
     "full_order": (1, "what is equal to such a drive is one"),
     "identification": (51, "a fit has its own kinds of model, until it has one problem"),
-    "linear": (1, "the door: what is no machine is refused"),
+    "machine": (3, "the doors: join takes models or machines, linearize refuses what is none"),
     "report": (2, "a page of a fit is that of a drive or of a user-defined model"),
 }
 """By package: how often at most, and why."""

@@ -13,11 +13,11 @@ import typer
 import swashplate
 from swashplate import Drive, simulate_many
 from swashplate.cli import app
-from swashplate.equations import Definition, Machine, Model, equation, sensitivities, simulate
 from swashplate.errors import SwashplateError
 from swashplate.export import content_of, fmu
 from swashplate.identification import ModelSetup
-from swashplate.linear import linearize
+from swashplate.machine import Definition, Machine, Model, equation, sensitivities, simulate
+from swashplate.machine.linear import linearize
 from swashplate.models.displacement_control import spool_balance
 
 MOST = 8

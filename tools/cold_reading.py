@@ -19,8 +19,8 @@ from typing import NamedTuple
 
 SOURCE = Path(__file__).parents[1] / "src" / "swashplate"
 PACKAGES = {
-    "equations": ["equations"],
-    "drive": ["models", "drive", "batch.py", "linear", "full_order"],
+    "machine": ["machine"],
+    "drive": ["models", "drive", "full_order"],
     "campaign": ["campaign", "drafting", "rig.py", "logs"],
     "identification": ["identification"],
     "analysis": ["analysis", "parameters"],

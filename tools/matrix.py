@@ -87,7 +87,7 @@ CHECKS = (
 )
 DEMO, ENGINE = (
     CHECKS[0],
-    Check("engine", (*CHECKS[-1].words, "tests/equations", "tests/linear")),
+    Check("engine", (*CHECKS[-1].words, "tests/machine", "tests/linear")),
 )
 """What `make pythons` runs: the README's first command, and what compiles equations."""
 ENVIRONMENTS = (

@@ -89,7 +89,7 @@ TRIPS = {
 EQUATION = """
 from typing import NamedTuple
 
-from swashplate.equations import Machine, Model, discretised, equation, simulate
+from swashplate.machine import Machine, Model, discretised, equation, simulate
 
 
 class Numbers(NamedTuple):

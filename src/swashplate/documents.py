@@ -26,7 +26,8 @@ LARGEST = 64 * 2**20
 LARGEST_TOML = 8 * 2**20
 """Characters of a TOML text: a thousand runs take 200,000, and more would be parsed for minutes."""
 DEEPEST = 40
-"""Parts of a dotted key. The parser's time grows with the cube of their number."""
+"""Parts of a dotted key, and tables and lists within each other. The parser's time grows with the
+cube of the former."""
 LONGEST_KEY = 200
 LONGEST_TEXT = 20_000
 """Characters of a key and of a text."""
@@ -133,17 +134,19 @@ def _has_deep_key(text: str) -> bool:
     return False
 
 
-def _check_values(value: Any, origin: str) -> None:
-    """Refuse texts that would steer a terminal or break a page, and integers beyond 64 bits."""
+def _check_values(value: Any, origin: str, depth: int = 0) -> None:
+    """Refuse texts that would steer a terminal, integers beyond 64 bits, and a deep nest of all."""
+    if depth > DEEPEST:
+        raise FileError(f"{origin} nests its tables or lists too deeply, beyond {DEEPEST}.")
     if isinstance(value, str):
         _check_text(value, LONGEST_TEXT, "text", origin)
     elif isinstance(value, dict):
         for key, entry in value.items():
             _check_text(key, LONGEST_KEY, "key", origin)
-            _check_values(entry, origin)
+            _check_values(entry, origin, depth + 1)
     elif isinstance(value, list):
         for entry in value:
-            _check_values(entry, origin)
+            _check_values(entry, origin, depth + 1)
     elif isinstance(value, int) and not -(2**63) <= value < 2**63:
         raise FileError(f"{origin} has an integer beyond 64 bits, a number with too many digits.")
 

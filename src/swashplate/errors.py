@@ -37,7 +37,7 @@ class ParameterError(SwashplateError):
     """A parameter that is missing, unknown or breaks a rule."""
 
 
-class UnknownParameterError(ParameterError, KeyError):
+class UnknownParameterError(ParameterError, InputError, KeyError):
     """A name that no parameter has; also a ``KeyError``."""
 
 

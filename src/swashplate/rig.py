@@ -32,8 +32,8 @@ from swashplate.__about__ import __version__
 from swashplate.campaign import CHANNEL_KINDS, KINDS, SIGNALS, ChannelKind
 from swashplate.drive import Drive, Simulation
 from swashplate.entries import SCHEMA
-from swashplate.equations.marching import SOURCE_RATE
 from swashplate.errors import FileError, InputError, ParameterError
+from swashplate.machine.marching import SOURCE_RATE
 from swashplate.maneuvers import Maneuver, positive, source_tests, whole
 from swashplate.results import Result
 from swashplate.tables import write_text, write_whole

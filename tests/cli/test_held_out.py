@@ -16,7 +16,7 @@ from swashplate.identification.validation import RunQuality
 
 MODEL = """
 from typing import NamedTuple
-from swashplate.equations import Model, discretised, equation
+from swashplate.machine import Model, discretised, equation
 from swashplate.identification import UserModel
 
 class Motor(NamedTuple):

@@ -14,7 +14,7 @@ import polars as pl
 import pytest
 import typer.main
 
-from swashplate import Drive, linear, maneuvers
+from swashplate import Drive, linearize, maneuvers
 from swashplate.cli import app
 from swashplate.cli.machines import OwnMachine, machine_in
 from swashplate.cli.parsing import machine_word
@@ -23,7 +23,7 @@ FILE = """
 from typing import Annotated, NamedTuple
 
 from swashplate import Drive
-from swashplate.equations import Definition, Machine, Model, discretised, equation, join
+from swashplate.machine import Definition, Machine, Model, discretised, equation, join
 from swashplate.identification import UserModel
 
 
@@ -234,7 +234,7 @@ def test_a_linear_model_is_that_of_python(done, own):
     words = ("--at", "valve=0.5", "--at", "bias=0", "--rate", "100", "--out", "a.json")
     done("linearize", "own_tank.py:settling", *words)
     machine = machine_of("own_tank.py:settling").machine
-    expected = linear.linearize(machine, {"valve": 0.5, "bias": 0.0}, 100.0)
+    expected = linearize(machine, {"valve": 0.5, "bias": 0.0}, 100.0)
     expected.write("b.json")
     assert Path("a.json").read_bytes() == Path("b.json").read_bytes()
 

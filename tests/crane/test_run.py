@@ -21,9 +21,9 @@ from swashplate.crane import (
     simulate,
 )
 from swashplate.crane.rope import in_ship_axes
-from swashplate.equations import Model, equation
 from swashplate.errors import DomainError, InputError
 from swashplate.executors import Threads
+from swashplate.machine import Model, equation
 
 G = 9.80665
 TIP = control.TipShaper("zv")

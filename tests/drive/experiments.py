@@ -6,8 +6,8 @@ import numpy as np
 
 from swashplate import ParameterSet, maneuvers
 from swashplate.drive import bound_drive, requested_columns
-from swashplate.equations.marching import ObservedRecord, RunValues
-from swashplate.equations.marching.derivatives import Jacobian, Triangle
+from swashplate.machine.marching import ObservedRecord, RunValues
+from swashplate.machine.marching.derivatives import Jacobian, Triangle
 
 NOTHING = RunValues()
 RATE = 512.0

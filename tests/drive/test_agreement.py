@@ -11,7 +11,7 @@ import pytest
 from tests.drive.experiments import ALL, LOAD, RIPPLE, jacobian, residuals
 
 from swashplate import Drive, Simulation, maneuvers
-from swashplate.equations.marching import Observation, ObservedRecord, record_of
+from swashplate.machine.marching import Observation, ObservedRecord, record_of
 
 SIGNALS = (
     "current_positive",

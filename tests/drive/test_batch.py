@@ -21,11 +21,10 @@ from swashplate import (
     Threads,
     simulate_many,
 )
-from swashplate import batch as batches
-from swashplate.equations import Machine, Model, Tap, equation, simulate
-from swashplate.equations.code_generation.machine_code import optimised
-from swashplate.equations.marching import CodeForm, SampleCode, output_of
-from swashplate.equations.marching.lanes import lanes_text
+from swashplate.machine import Machine, Model, Tap, equation, simulate
+from swashplate.machine.code_generation.machine_code import optimised
+from swashplate.machine.marching import CodeForm, SampleCode, output_of
+from swashplate.machine.marching.lanes import lanes_text
 from swashplate.models.displacement_control import PumpOptions
 from swashplate.models.drive import pump_drive
 
@@ -138,7 +137,7 @@ def test_costs_are_those_of_the_outputs() -> None:
 
 @pytest.mark.parametrize("per_file", [2**23, 1])
 def test_outputs_are_streamed_to_files(tmp_path: Path, monkeypatch, per_file: int) -> None:
-    monkeypatch.setattr(batches, "SAMPLES_A_FILE", per_file)
+    monkeypatch.setattr("swashplate.machine.batch.SAMPLES_A_FILE", per_file)
     found = many(output="position", to=tmp_path / "outputs")
     assert found.output is None
     assert sorted(found.files) == sorted((tmp_path / "outputs").iterdir())

@@ -12,7 +12,7 @@ import tomlkit
 from swashplate import DomainError, Drive, InputError, ParameterError, maneuvers
 from swashplate.analysis import envelope, speed_limits
 from swashplate.drive import drive_records, simulate_drive
-from swashplate.equations import Definition, equation
+from swashplate.machine import Definition, equation
 from swashplate.models.amplifier import steady_current
 from swashplate.models.displacement_control import (
     PressureLimits,

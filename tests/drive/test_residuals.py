@@ -12,7 +12,7 @@ from tests.drive.experiments import HARD, RATE, SWING, jacobian, residuals, tria
 
 from swashplate import DomainError, Drive, InputError, ParameterError, maneuvers
 from swashplate.drive import ALL_COLUMNS, PUMP_COLUMNS, simulate_drive
-from swashplate.equations.marching import Observation, ObservedRecord, RunValues, record_of
+from swashplate.machine.marching import Observation, ObservedRecord, RunValues, record_of
 
 CARD = ("current", "current_sum", "current_positive", "current_negative")
 PUMP = ("shaft_speed", "shaft_position", "stroker_pressure", "swash_angle", "spool_position")

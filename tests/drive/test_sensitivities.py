@@ -10,7 +10,7 @@ from tests.marks import rest_slow
 
 from swashplate import Drive, InputError, Limit, Simulation, maneuvers
 from swashplate.drive import ALL_COLUMNS
-from swashplate.equations import Sensitivities
+from swashplate.machine import Sensitivities
 
 
 @dataclass(frozen=True)

@@ -10,9 +10,9 @@ import pytest
 from tests.drive.experiments import triangle
 
 from swashplate import DomainError, Drive
-from swashplate.equations import Machine, Model, equation
-from swashplate.equations.marching import Observation, ObservedRecord, Record, record_of
-from swashplate.equations.marching import derivatives as engine
+from swashplate.machine import Machine, Model, equation
+from swashplate.machine.marching import Observation, ObservedRecord, Record, record_of
+from swashplate.machine.marching import derivatives as engine
 
 pytestmark = pytest.mark.traced
 

@@ -10,8 +10,8 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from swashplate import Campaign
-from swashplate.equations import Machine, simulate
 from swashplate.logs import open_log
+from swashplate.machine import Machine, simulate
 
 ROOT = Path(__file__).parents[2]
 DATA = ROOT.parent / "shared" / "data" / "actuator"

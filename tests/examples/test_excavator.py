@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from swashplate import Campaign
-from swashplate.equations import Machine, simulate
+from swashplate.machine import Machine, simulate
 
 ROOT = Path(__file__).parents[2]
 DATA = ROOT.parent / "shared" / "data" / "excavator"

@@ -14,9 +14,9 @@ from hypothesis import strategies as st
 from tests.marks import rest_slow
 
 from swashplate import Drive, export
-from swashplate.equations import Definition, Machine, Model, equation
-from swashplate.equations.code_generation import c_comment, c_function, comment_line
 from swashplate.export.c_source import interface
+from swashplate.machine import Definition, Machine, Model, equation
+from swashplate.machine.code_generation import c_comment, c_function, comment_line
 
 GCC = shutil.which("gcc")
 needs_gcc = pytest.mark.skipif(GCC is None, reason="there is no gcc here")

@@ -11,14 +11,14 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import pytest
-from tests.equations import test_constructs
-from tests.equations.test_all_equations import EQUATIONS, equations_of
 from tests.export.twins import InC, flagged
+from tests.machine import test_constructs
+from tests.machine.test_all_equations import EQUATIONS, equations_of
 
-from swashplate.equations import equation, repeated, root
-from swashplate.equations.code_generation import Loops, helpers_in
 from swashplate.errors import EquationError
 from swashplate.export.c_source import equation_in_c
+from swashplate.machine import equation, repeated, root
+from swashplate.machine.code_generation import Loops, helpers_in
 
 REFUSED = ("rubbing", "rubbed")
 """Constructs of which there are none in C: an option that is a tuple of numbers, or None."""

@@ -20,8 +20,8 @@ import pytest
 from tests.marks import rest_slow
 
 from swashplate import DomainError, Drive, FileError, InputError, export
-from swashplate.equations import Definition, equation
 from swashplate.export import libraries
+from swashplate.machine import Definition, equation
 from swashplate.models.displacement_control import Pump, stopped_spool
 
 fmpy = pytest.importorskip("fmpy")

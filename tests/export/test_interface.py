@@ -13,9 +13,9 @@ from tests.marks import rest_slow
 
 from swashplate import Drive, InputError
 from swashplate.drive import Sample
-from swashplate.equations import state_paths
 from swashplate.export import content_of, drive_sources, libraries, values_of
 from swashplate.export.c_source import feedthrough
+from swashplate.machine.model import state_paths
 
 OK, BAD_VALUE, UNSTABLE, BAD_DELAY, DOMAIN, NOT_READY = range(6)
 H = 1.0 / 512.0

@@ -12,9 +12,9 @@ import pytest
 from tests.export.conftest import InC
 from tests.marks import rest_slow
 
-from swashplate.equations import Machine, Model, Tap, join, simulate
 from swashplate.export import c, content_of
 from swashplate.export.c_source import interface
+from swashplate.machine import Machine, Model, Tap, join, simulate
 
 NAMES = """
 m status measured i step inputs now before whole fraction line before_record newest stale settled
@@ -38,7 +38,7 @@ FEW = 31
 TEXT = """
 from typing import NamedTuple
 
-from swashplate.equations import equation
+from swashplate.machine import equation
 
 
 class Numbers(NamedTuple):

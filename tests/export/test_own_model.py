@@ -9,13 +9,16 @@ from typing import Annotated, Any, NamedTuple
 import numpy as np
 import pytest
 from tests.drive.test_own_equation import DRAGGED
-from tests.equations.test_own_model import COMMAND, STROKE, P, valve
 from tests.export.conftest import InC
 from tests.export.webassembly import Page
+from tests.machine.test_own_model import COMMAND, STROKE, P, valve
 from tests.marks import rest_slow
 
 from swashplate import Drive
-from swashplate.equations import (
+from swashplate.errors import EquationError, InputError
+from swashplate.export import c, compare, content_of, drive_sources, fmu, libraries, values_of, wasm
+from swashplate.export.c_source import Exported, interface
+from swashplate.machine import (
     Definition,
     Machine,
     Model,
@@ -28,9 +31,6 @@ from swashplate.equations import (
     root,
     simulate,
 )
-from swashplate.errors import EquationError, InputError
-from swashplate.export import c, compare, content_of, drive_sources, fmu, libraries, values_of, wasm
-from swashplate.export.c_source import Exported, interface
 from swashplate.models import displacement_control
 from swashplate.models.drive import drive
 

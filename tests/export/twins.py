@@ -8,10 +8,11 @@ from typing import Any
 
 import numpy as np
 
-from swashplate.equations import is_named_tuple, kernel, parsed
-from swashplate.equations.code_generation import Loops, helpers_in
-from swashplate.equations.declaration import remember_text
 from swashplate.export.c_source import EquationInC, equation_in_c
+from swashplate.machine import kernel
+from swashplate.machine.code_generation import Loops, helpers_in
+from swashplate.machine.declaration import remember_text
+from swashplate.machine.language import is_named_tuple, parsed
 
 CALLS = 3000
 SPECIAL = np.array(

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from swashplate import DomainError, FullOrderDrive, PhysicalSet
-from swashplate.equations import Machine
-from swashplate.equations.marching import (
+from swashplate.machine import Machine
+from swashplate.machine.marching import (
     Observation,
     ObservedRecord,
     jacobian,

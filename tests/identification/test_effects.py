@@ -11,9 +11,9 @@ from tests.identification.test_own_model import FREE, OWN, TRUTH, trial, valve
 
 from swashplate import Campaign, Drive, Experiment, ParameterError
 from swashplate.campaign import Accuracy, resolution_of_inputs
-from swashplate.equations import Machine, simulate
 from swashplate.identification import ModelSetup, StageFit, estimates_of, fit, uncertainty_of
 from swashplate.identification.statistics.effects import after_play, changes_of
+from swashplate.machine import Machine, simulate
 from swashplate.maneuvers import source_tests
 
 RATE = 512.0

@@ -23,9 +23,9 @@ from swashplate import (
     SwashplateError,
     maneuvers,
 )
-from swashplate.equations import Model
 from swashplate.identification import ModelSetup, Search, fit, load_setup
 from swashplate.identification.estimation.setup import Free, setup_text
+from swashplate.machine import Model
 
 TRUTH = {"J_plus": 0.26, "J_minus": 0.31, "Z10": 13.0}
 

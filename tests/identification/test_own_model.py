@@ -22,7 +22,6 @@ from swashplate import (
     InputError,
     ParameterError,
 )
-from swashplate.equations import Definition, Machine, Model, Tap, equation, simulate
 from swashplate.executors import Processes
 from swashplate.identification import (
     Identification,
@@ -41,6 +40,7 @@ from swashplate.identification import (
 )
 from swashplate.identification.estimation.model import linearised
 from swashplate.identification.estimation.problem import rounded_unknowns
+from swashplate.machine import Definition, Machine, Model, Tap, equation, simulate
 
 RATE = 20.0
 TIME = np.arange(240) / RATE

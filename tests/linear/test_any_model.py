@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from swashplate import DomainError, Drive, InputError
-from swashplate.equations import Machine, Model, Tap, discretised, equation, join
-from swashplate.equations.marching import PartNumbers, SignalId, marched
-from swashplate.linear import LinearModel, linearize, settle
+from swashplate.machine import Machine, Model, Tap, discretised, equation, join
+from swashplate.machine.linear import LinearModel, linearize, settle
+from swashplate.machine.marching import PartNumbers, SignalId, marched
 
 RATE = 100.0
 H = 1.0 / RATE

@@ -9,7 +9,7 @@ import pytest
 
 from swashplate import DomainError, Drive, InputError
 from swashplate.drive import LinearDrive, response_table
-from swashplate.linear import loop_margins
+from swashplate.machine.linear import loop_margins
 
 
 def radius(model: LinearDrive, gain: float, late: int = 0) -> float:

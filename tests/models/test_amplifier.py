@@ -12,7 +12,7 @@ from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
 from swashplate import Drive
-from swashplate.equations import Window
+from swashplate.machine import Window
 from swashplate.models import amplifier
 from swashplate.models.amplifier import CardChannel, Filter
 

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
 from swashplate import Drive
-from swashplate.equations import TAN_22_5, arctangent, faded, small_arctangent, soft_threshold
+from swashplate.machine.library import TAN_22_5, arctangent, faded, small_arctangent, soft_threshold
 from swashplate.models import displacement_control as control
 from swashplate.models.displacement_control import Pump, Stroking
 

@@ -6,7 +6,8 @@ from typing import Any
 import pytest
 from tests.marks import rest_slow
 
-from swashplate.equations import derive, faded, small_arctangent, soft_threshold
+from swashplate.machine import derive
+from swashplate.machine.library import faded, small_arctangent, soft_threshold
 from swashplate.models import amplifier
 from swashplate.models import displacement_control as control
 from swashplate.models.amplifier import CardChannel

@@ -30,8 +30,8 @@ from swashplate.analysis import (
     trial_of,
     what_if,
 )
-from swashplate.equations import Definition, Machine, Model, Run, discretised, equation, simulate
 from swashplate.full_order import compare
+from swashplate.machine import Definition, Machine, Model, Run, discretised, equation, simulate
 from swashplate.report import figures
 from swashplate.report.figures import plot_simulation, save_figure
 from swashplate.report.lines import COLUMNS, MOST_SPANS, SHADES, draw, gap_rows, thinned

@@ -9,7 +9,7 @@ import pytest
 import sympy as sp
 
 from swashplate import Drive, PhysicalSet
-from swashplate.equations import tuple_from
+from swashplate.machine.fields import tuple_from
 from swashplate.models import displacement_control, machine, pump, refinements
 from swashplate.models.displacement_control import Pump
 from swashplate.models.machine import Hydrostat

@@ -9,8 +9,9 @@ import pint
 import pytest
 
 from swashplate import Drive, maneuvers
-from swashplate.equations import derive, tuple_from
 from swashplate.full_order import QUANTITIES, FullOrderDrive, PhysicalSet
+from swashplate.machine import derive
+from swashplate.machine.fields import tuple_from
 from swashplate.models import displacement_control as control
 from swashplate.models import machine
 from swashplate.models.displacement_control import Pump

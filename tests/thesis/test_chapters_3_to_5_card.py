@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from swashplate import Drive, maneuvers
-from swashplate.batch import SquaredError
-from swashplate.equations.model import tap_delay
+from swashplate.machine.batch import SquaredError
+from swashplate.machine.model import tap_delay
 from swashplate.models.amplifier import card
 
 H = 1.0 / 512.0

@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swashplate.drive import Drive
-from swashplate.equations import Machine, with_replacements
-from swashplate.equations.marching import SOURCE_RATE, PartNumbers, called
+from swashplate.machine import Machine, with_replacements
+from swashplate.machine.marching import SOURCE_RATE, PartNumbers, called
 from swashplate.models.displacement_control import PumpOptions, pressure_limits
 from swashplate.models.pump import PumpState
 from swashplate.parameters import FULL_VOLTAGE

@@ -13,8 +13,8 @@ from numpy.typing import ArrayLike, NDArray
 from swashplate.analysis.capability import dead_zone, saturation, starting_acceleration
 from swashplate.analysis.outcomes import rms_difference
 from swashplate.drive import Drive
-from swashplate.equations.marching import SOURCE_RATE
 from swashplate.errors import DomainError, InputError
+from swashplate.machine.marching import SOURCE_RATE
 from swashplate.parameters import FULL_VOLTAGE, LoggedCommand
 from swashplate.results import GivenAxes, Result, figures, short
 from swashplate.tables import (

@@ -13,8 +13,8 @@ from numpy.typing import ArrayLike, NDArray
 from swashplate.analysis.capability import farthest_stop
 from swashplate.analysis.outcomes import checked_speed, rms_difference
 from swashplate.drive import Drive, Limit, RunKeywords, Simulation, simulate_drive
-from swashplate.equations.marching import SOURCE_RATE, Start
 from swashplate.errors import DomainError, ParameterError, SwashplateError
+from swashplate.machine.marching import SOURCE_RATE, Start
 from swashplate.parameters import Change
 from swashplate.results import Result, Tabular, figures
 from swashplate.tables import Column, Table, listed, quantity, share_cell

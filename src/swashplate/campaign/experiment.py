@@ -28,7 +28,7 @@ from swashplate.tables import UNIT, Column, Table
 if TYPE_CHECKING:
     import polars
 
-    from swashplate.equations.marching import Interpolation
+    from swashplate.machine.marching import Interpolation
     from swashplate.results import Figure
 
 Array = NDArray[np.float64]

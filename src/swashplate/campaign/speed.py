@@ -13,8 +13,8 @@ from numpy.typing import ArrayLike
 
 from swashplate.campaign.experiment import Channel
 from swashplate.campaign.samples import Array, interpolate_counts, signal, stamps_of
-from swashplate.equations import Machine, Model, equation, simulate
 from swashplate.errors import InputError
+from swashplate.machine import Machine, Model, equation, simulate
 
 LOW_PASS = 2.0 * np.pi * 10.0
 """a, cut-off of the low pass. [rad/s]"""

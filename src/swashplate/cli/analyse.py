@@ -57,7 +57,7 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
-    from swashplate.linear import FrequencyResponse, LinearModel
+    from swashplate.machine.linear import FrequencyResponse, LinearModel
 
 LEVEL, SPAN = 0.95, (0.9, 1.1)
 """Level of the bands, and the usual factors of a design variable."""
@@ -562,7 +562,7 @@ def linearize(
     by its model's equation, or by a march under the constant inputs; --set
     start.PATH=VALUE gives its states instead.
     """
-    from swashplate.linear import LINEAR_MODEL
+    from swashplate.machine.linear import LINEAR_MODEL
 
     check_writable(out, LINEAR_MODEL, force=force)
     if machine.own is not None:
@@ -788,7 +788,7 @@ def _own_response(
     rate: float,
 ) -> tuple[FrequencyResponse, LinearModel | None]:
     """Frequency response of a machine of a user's own, and its linear model."""
-    from swashplate.linear import sweep
+    from swashplate.machine.linear import sweep
 
     input, output = ends
     if input in at:

@@ -27,7 +27,7 @@ from swashplate.tables import PAGE, Form, check_folder
 
 if TYPE_CHECKING:
     from swashplate.drive import Drive
-    from swashplate.equations import Machine
+    from swashplate.machine import Machine
 
 FMU = Form("an FMU", (".fmu",))
 WASM = Form("WebAssembly", (".wasm",))

@@ -81,7 +81,7 @@ class StageClock:
     def part(self, name: str) -> Iterator[None]:
         """Count what is done to a part."""
         begin = perf_counter()
-        from swashplate.equations.code_generation import generating_time
+        from swashplate.machine.code_generation import generating_time
 
         generated_before = generating_time()
         yield

@@ -76,7 +76,7 @@ def doctor() -> None:
     show(table)
     with spinner("Simulating the hoist"):
         from swashplate.drive import Drive
-        from swashplate.equations import cache_folder, no_cache_reason
+        from swashplate.machine.cache import cache_folder, no_cache_reason
         from swashplate.maneuvers import step
 
         run = Drive.preset("hoist").simulate(step(9.0, start=0.0, stop=10.0, length=10.0))

@@ -19,8 +19,8 @@ if TYPE_CHECKING:
     from types import ModuleType
 
     from swashplate.drive import Drive, Simulation
-    from swashplate.equations import Machine, Model, Run
     from swashplate.identification import ModelSetup, UserModel
+    from swashplate.machine import Machine, Model, Run
 
 MACHINE, MODEL = "machine", "model"
 """Names that stand for a file's machine if none is named, in this order."""
@@ -79,7 +79,7 @@ class OwnMachine:
 
     def named(self, name: str, names: Sequence[str], what: str) -> str:
         """The full name of an input, an output or a signal; a wrong one is refused."""
-        from swashplate.equations import full_name, near_names
+        from swashplate.machine.model import full_name, near_names
 
         full = full_name(name, names)
         if full not in names:
@@ -123,7 +123,7 @@ class OwnMachine:
 
     def steps_a_second(self, stated: float | None = None) -> float:
         """Steps of its equations, as many as `simulate` takes, unless others are stated. [Hz]"""
-        from swashplate.equations.marching import SOURCE_RATE, check_rate, substeps_of
+        from swashplate.machine.marching import SOURCE_RATE, check_rate, substeps_of
 
         if stated is not None:
             check_rate(stated)
@@ -144,7 +144,7 @@ class OwnMachine:
 
     def signals_table(self) -> Table:
         """Its inputs, states and signals."""
-        from swashplate.equations import floats_of
+        from swashplate.machine.fields import floats_of
 
         table = Table("", (Column("signal"), Column("is"), Column("meaning", wrap=True), UNIT))
         model = self.model
@@ -163,9 +163,9 @@ class OwnMachine:
 def machine_in(word: MachineWord) -> OwnMachine | Drive:
     """The machine, or the drive, that a word names."""
     from swashplate.drive import Drive
-    from swashplate.equations import Machine, Model
     from swashplate.identification import UserModel
     from swashplate.identification.estimation import loaded_module
+    from swashplate.machine import Machine, Model
 
     # a script may print: that is no part of what the command says
     with redirect_stdout(sys.stderr):
@@ -194,7 +194,7 @@ def machine_in(word: MachineWord) -> OwnMachine | Drive:
 def _lacks(word: MachineWord, module: ModuleType) -> str:
     """That a file has no machine of a name, and which it has."""
     from swashplate.drive import Drive
-    from swashplate.equations import Machine
+    from swashplate.machine import Machine
 
     has = [key for key, value in vars(module).items() if isinstance(value, Drive | Machine)]
     listed = f"; there are {', '.join(has)}" if has else ""
@@ -207,9 +207,11 @@ def _lacks(word: MachineWord, module: ModuleType) -> str:
 
 def _of_model(found: UserModel, word: MachineWord, module: ModuleType, title: str) -> OwnMachine:
     """A model with the numbers of its file, or of a fit to it."""
-    from swashplate.equations import Machine, defaults_of, parameter_paths, tuple_from
     from swashplate.identification import ModelSetup
     from swashplate.identification.estimation import states_started_by
+    from swashplate.machine import Machine
+    from swashplate.machine.fields import defaults_of, tuple_from
+    from swashplate.machine.model import parameter_paths
 
     model = found.model
     numbers, units = dict[str, float](), dict[str, str]()
@@ -273,7 +275,7 @@ def fitted_setup(model: Path, fitted: str | None) -> ModelSetup:
 
 def numbers_of(machine: Machine) -> dict[str, float]:
     """Parameters of a machine by path."""
-    from swashplate.equations import parameter_paths
+    from swashplate.machine.model import parameter_paths
 
     return dict(zip(parameter_paths(machine.model), machine.params.tolist(), strict=True))
 
@@ -292,8 +294,8 @@ def parameter_definitions(own: OwnMachine) -> dict[str, NumberDefinition]:
 
 def changed(own: OwnMachine, values: Sequence[str] = (), factors: Sequence[str] = ()) -> OwnMachine:
     """A machine with values set and then scaled; ``start.PATH`` is a state at the first sample."""
-    from swashplate.equations import full_name, near_names
     from swashplate.identification.estimation import states_started_by
+    from swashplate.machine.model import full_name, near_names
 
     if not values and not factors:
         return own
@@ -351,7 +353,7 @@ def changed(own: OwnMachine, values: Sequence[str] = (), factors: Sequence[str] 
 
 def _starts(own: OwnMachine) -> Iterator[tuple[str, NumberDefinition]]:
     """What can be set of the state at the first sample, by name."""
-    from swashplate.equations import floats_of
+    from swashplate.machine.fields import floats_of
 
     for index, part in enumerate(own.model.parts):
         prefix = own.model.prefix(index)
@@ -425,7 +427,7 @@ def limits_table(own: OwnMachine, run: Run | None = None) -> Table:
 
 def limit_meanings(model: Model) -> dict[str, str]:
     """What each limit of a model means, by its name; empty where the model does not say it."""
-    from swashplate.equations import definition_of
+    from swashplate.machine.fields import definition_of
 
     meanings = dict[str, str]()
     for name, (index, _) in model.limit_bits.items():

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
-    from swashplate.linear import LinearModel, SettledPoint
+    from swashplate.machine.linear import LinearModel, SettledPoint
 
     Array = NDArray[np.float64]
 AT_ZERO = 1e-9
@@ -29,7 +29,7 @@ def operating_point(own: OwnMachine, at: Mapping[str, float], rate: float) -> Se
     """
     import numpy as np
 
-    from swashplate.linear import SettledPoint, settle, states_at_start
+    from swashplate.machine.linear import SettledPoint, settle, states_at_start
 
     if own.stated:
         states = states_at_start(own.machine, at, rate, own.begin)
@@ -61,7 +61,7 @@ def linear_model(
     outputs: Sequence[str] | None = None,
 ) -> LinearModel:
     """A machine's step, linearised at an operating point."""
-    from swashplate.linear import linearize
+    from swashplate.machine.linear import linearize
 
     states = None if point.by_equation else point.states
     return linearize(own.machine, at, rate, states=states, inputs=inputs, outputs=outputs)
@@ -88,7 +88,7 @@ def linear_tables(
 
 
 def _point_table(own: OwnMachine, at: Mapping[str, float], point: SettledPoint) -> Table:
-    from swashplate.equations import state_paths
+    from swashplate.machine.model import state_paths
 
     columns = (Column("Operating point"), Column("is"), Column("", ".5g"), Column("unit"))
     table = Table("", (*columns, Column("changes", "s")))

@@ -390,7 +390,7 @@ class CommandSampling:
 
     def __post_init__(self) -> None:
         """Refuse a rate out of range, before anything is sampled."""
-        from swashplate.equations.marching import least_substeps
+        from swashplate.machine.marching import least_substeps
 
         least_substeps(self.rate)
 

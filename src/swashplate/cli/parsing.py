@@ -198,7 +198,7 @@ def fitted_numbers(
     word: MachineWord, setup: ModelSetup, needed: Collection[str], *, others: bool = True
 ) -> dict[str, float]:
     """Numbers in the folder of a fit, which must have those needed; `others` may be there, too."""
-    from swashplate.equations import is_real
+    from swashplate.machine.fields import is_real
 
     folder = Path(word.fitted)
     file = folder / NUMBERS if folder.is_dir() else folder

@@ -19,8 +19,8 @@ if TYPE_CHECKING:
     from swashplate.cli.machines import OwnMachine
     from swashplate.cli.options import CommandSampling, MachineChoice, Simulating, Start
     from swashplate.drive import Drive, Simulation
-    from swashplate.equations import Run
     from swashplate.logs import Log, Series
+    from swashplate.machine import Run
     from swashplate.maneuvers import Maneuver
 
 _ENDING = re.compile(r"\.[A-Za-z]\w*$")
@@ -52,7 +52,7 @@ def named_maneuver(word: str, *drives: Drive) -> Maneuver:
 def at_rate(drive: Drive, rate: float) -> Drive:
     """The drive for a rate; a filter's recursion for another rate is replaced, with a note."""
     from swashplate.cli.terminal import note
-    from swashplate.equations.marching import least_substeps
+    from swashplate.machine.marching import least_substeps
 
     filter_rate = drive.parameters.rate
     marched = rate * least_substeps(rate)
@@ -237,8 +237,8 @@ def own_run(own: OwnMachine, command: str, options: Simulating) -> tuple[str, Ru
     A maneuver drives the first input that is not given otherwise; columns of a log are taken by
     the names of the inputs.
     """
-    from swashplate.equations import simulate
-    from swashplate.equations.marching import even_rate
+    from swashplate.machine import simulate
+    from swashplate.machine.marching import even_rate
     from swashplate.maneuvers import Maneuver, parse
 
     is_log = _is_file(command)

@@ -21,8 +21,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from swashplate.crane.axes import RATE
-from swashplate.equations import Model
 from swashplate.errors import InputError
+from swashplate.machine import Model
 
 Array = NDArray[np.float64]
 Impulses = tuple[float, float, float]

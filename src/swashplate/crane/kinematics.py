@@ -9,7 +9,7 @@ from collections.abc import Iterable
 from math import atan2, cos, sin, sqrt
 from typing import NamedTuple
 
-from swashplate.equations import equation
+from swashplate.machine import equation
 
 
 class Vector(NamedTuple):

@@ -10,7 +10,7 @@ from swashplate.crane.axes import AXES
 from swashplate.crane.crane import Crane
 from swashplate.crane.kinematics import Boom, boom_rate, reach_rate
 from swashplate.crane.rope import GRAVITY
-from swashplate.linear import LinearModel
+from swashplate.machine.linear import LinearModel
 
 STATES = ("offset_out", "speed_out", "offset_across", "speed_across", "rope", "slew", "boom")
 OUTPUTS = ("swing_out", "swing_across", "rope", "slew", "boom")

@@ -20,8 +20,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from swashplate.crane.kinematics import Vector, add_scaled, dot, norm, rotation, to_ship, vector_of
-from swashplate.equations import equation, kernel
 from swashplate.errors import InputError
+from swashplate.machine import equation, kernel
 from swashplate.results import Result
 
 Array = NDArray[np.float64]

@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 
 from swashplate.campaign import Channel, Experiment, InputSignal
 from swashplate.drafting.plain_drive import MODEL, JumpWidth, PlainDrive
-from swashplate.equations import Machine
-from swashplate.equations.marching import (
+from swashplate.machine import Machine
+from swashplate.machine.marching import (
     ObservedRecord,
     Record,
     RunValues,

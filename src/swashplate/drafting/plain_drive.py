@@ -5,7 +5,7 @@ from __future__ import annotations
 from math import exp
 from typing import NamedTuple
 
-from swashplate.equations import Model, equation
+from swashplate.machine import Model, equation
 
 SHORTEST_LAG = 1e-4
 """Lag below which one is marched as this one, a fiftieth of the march's step. [s]"""

@@ -15,9 +15,16 @@ from swashplate.drive.instance import (
 from swashplate.drive.march import start_states
 from swashplate.drive.signals import check_output
 from swashplate.drive.simulation import Simulation
-from swashplate.equations import BoundModel, Sensitivities
-from swashplate.equations.marching import NO_RUN_VALUES, ObservedRecord, Record, RunValues, Start
 from swashplate.errors import InputError
+from swashplate.machine import Sensitivities
+from swashplate.machine.marching import (
+    NO_RUN_VALUES,
+    BoundModel,
+    ObservedRecord,
+    Record,
+    RunValues,
+    Start,
+)
 from swashplate.parameters import DEFINITIONS, SWITCHES, Definitions, ParameterSet
 
 CURRENTS = ("current", "current_sum", "current_positive", "current_negative")

@@ -13,18 +13,18 @@ from numpy.typing import ArrayLike, NDArray
 from swashplate.drive.equilibrium import steady_states
 from swashplate.drive.instance import at_every_rate, drive_instance, with_equation
 from swashplate.drive.march import Sample, drive_stepper, simulate_drive
-from swashplate.drive.records import RunKeywords, drive_records
+from swashplate.drive.records import RunKeywords, drive_inputs, drive_records
+from swashplate.drive.signals import check_output
 from swashplate.drive.simulation import Simulation
-from swashplate.equations import (
+from swashplate.errors import InputError
+from swashplate.machine import Equation, Machine, Replacement, Stepper
+from swashplate.machine.marching import (
+    SOURCE_RATE,
     CompiledStep,
-    Equation,
-    Machine,
-    Replacement,
-    Stepper,
+    Interpolation,
+    Start,
     compiled_step,
 )
-from swashplate.equations.marching import SOURCE_RATE, Interpolation, Start
-from swashplate.errors import InputError
 from swashplate.maneuvers import Maneuver
 from swashplate.parameters import (
     FULL_VOLTAGE,
@@ -40,12 +40,11 @@ from swashplate.results import Result
 from swashplate.units import in_si
 
 if TYPE_CHECKING:
-    from swashplate.batch import Batch, SquaredError
     from swashplate.drive.linear_drive import LinearDrive
     from swashplate.drive.small_motion import Coulomb, Input
-    from swashplate.equations import Sensitivities
     from swashplate.executors import Executor
-    from swashplate.linear import FrequencyResponse
+    from swashplate.machine import Batch, Sensitivities, SquaredError
+    from swashplate.machine.linear import FrequencyResponse
     from swashplate.tables import Table
 
 Array = NDArray[np.float64]
@@ -54,10 +53,9 @@ Array = NDArray[np.float64]
 class Drive(Result, Machine, Mapping[str, Parameter]):
     """A hydrostatic drive from joystick voltage to shaft speed. Immutable.
 
-    It is a `Machine`, which all verbs take: `swashplate.equations.join` joins drives with a load,
-    `swashplate.export` writes them, `swashplate.linear` linearises them. And it is a mapping of its
-    parameters by symbol: ``drive["Z16"]``, or ``drive["Z16_plus"]`` for one
-    direction.
+    It is a `Machine`, which all verbs take: `swashplate.join` joins drives with a load,
+    `swashplate.export` writes them, `swashplate.linearize` linearises them. And it is a mapping of
+    its parameters by symbol: ``drive["Z16"]``, or ``drive["Z16_plus"]`` for one direction.
 
     Examples
     --------
@@ -75,7 +73,7 @@ class Drive(Result, Machine, Mapping[str, Parameter]):
         if not isinstance(parameters, ParameterSet):
             raise InputError(f"A Drive cannot be made from {parameters!r}: {_way(parameters)}.")
         machine = drive_instance(parameters, by_voltage=True)
-        self._set(machine.model, machine.parts, machine.name)
+        self._set(machine.model, machine.parts, machine.name, machine.rules)
         object.__setattr__(self, "parameters", parameters)
 
     def __reduce__(self) -> tuple[type[Drive], tuple[ParameterSet]]:
@@ -585,7 +583,7 @@ class Drive(Result, Machine, Mapping[str, Parameter]):
         >>> batch.output.shape
         (3, 5121)
         """
-        from swashplate.drive.batch import simulate_drives
+        from swashplate.machine import simulate_many
 
         commands = {"voltage": voltage, "current": current}
         given = {driver: record for driver, record in commands.items() if record is not None}
@@ -593,8 +591,19 @@ class Drive(Result, Machine, Mapping[str, Parameter]):
             raise InputError("A batch needs either a voltage or a current.")
         ((driver, command),) = given.items()
         machine = self if driver == "voltage" else self.by_current
-        records = drive_records(machine, command, rate, **keywords)
-        return simulate_drives(self.parameters, changes, records, output, cost, to, executor)
+        inputs, sampling = drive_inputs(machine, command, **keywords)
+        check_output(cost.output if cost else output)
+        return simulate_many(
+            machine,
+            changes,
+            inputs,
+            rate,
+            output=output,
+            cost=cost,
+            to=to,
+            executor=executor,
+            **sampling,
+        )
 
     def stepper(
         self,

@@ -10,9 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swashplate.drive.instance import card_of, drive_instance, models_of, without_ripple
-from swashplate.equations import Machine, is_real, with_replacements
-from swashplate.equations.marching import SOURCE_RATE, InitialStates, SignalId, called, marched
 from swashplate.errors import DomainError, InputError
+from swashplate.machine import Machine, with_replacements
+from swashplate.machine.fields import is_real
+from swashplate.machine.marching import SOURCE_RATE, InitialStates, SignalId, called, marched
 from swashplate.models.displacement_control import moment_sine, solenoid_force
 from swashplate.models.pump import overpowered
 from swashplate.parameters import FULL_VOLTAGE, ParameterSet

@@ -10,12 +10,12 @@ from numpy.typing import ArrayLike
 from swashplate.drive.instance import drive_instance, without_ripple
 from swashplate.drive.signals import UNITS
 from swashplate.drive.small_motion import OUTPUTS
-from swashplate.equations.marching import FASTEST, SOURCE_RATE, check_rate
 from swashplate.errors import InputError
-from swashplate.linear import (
+from swashplate.machine.linear import (
     FrequencyResponse,
     sweep,
 )
+from swashplate.machine.marching import FASTEST, SOURCE_RATE, check_rate
 from swashplate.models.displacement_control import Pump
 from swashplate.parameters import ParameterSet
 from swashplate.tables import Column, Table

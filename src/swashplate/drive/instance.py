@@ -3,20 +3,19 @@
 from __future__ import annotations
 
 from cmath import log, sqrt
-from dataclasses import replace
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import Any, NamedTuple
 
-from swashplate.equations import (
-    Machine,
-    Model,
-    Replacement,
-    check_members,
-    replaced_once,
-    uses_equation,
-)
-from swashplate.equations.marching import PartNumbers
+import numpy as np
+from numpy.typing import NDArray
+
 from swashplate.errors import InputError
+from swashplate.machine import Machine, Model, Replacement
+from swashplate.machine.marching import PartNumbers
+from swashplate.machine.replacement import check_members, replaced_once, uses_equation
+from swashplate.machine.rules import CheckedRule, MemberRules
 from swashplate.models.amplifier import Card, CardChannel, CardOptions
 from swashplate.models.displacement_control import Pump, PumpOptions, steep_stops
 from swashplate.models.drive import Source as CurrentSource
@@ -28,7 +27,9 @@ from swashplate.models.drive import (
     settled_drive,
 )
 from swashplate.models.pump import searched_pressure, settled_pressure
-from swashplate.parameters import SIDES, ParameterSet
+from swashplate.parameters import SIDES, ParameterSet, check_rules
+
+Array = NDArray[np.float64]
 
 START = "start."
 """What the column of a number of the state at the first sample begins with, before its path."""
@@ -139,11 +140,32 @@ def drive_instance(parameters: ParameterSet, *, by_voltage: bool) -> Machine:
     pump = PartNumbers(pump_of(parameters), pump_options(parameters))
     if by_voltage:
         card = PartNumbers(card_of(parameters), card_options(parameters))
-        return Machine.of_parts(
-            models_of(parameters.equations).drive, (card, pump), parameters.name
-        )
-    model = models_of(parameters.equations).pump_drive
-    return Machine.of_parts(model, (PartNumbers(CurrentSource()), pump), parameters.name)
+        model = models_of(parameters.equations).drive
+    else:
+        card = PartNumbers(CurrentSource())
+        model = models_of(parameters.equations).pump_drive
+    rules = MemberRules(DriveRules(parameters))
+    return Machine.of_parts(model, (card, pump), parameters.name, (rules,))
+
+
+@dataclass(frozen=True)
+class DriveRules:
+    """Rules of `swashplate.parameters` for numbers of a drive's machine."""
+
+    parameters: ParameterSet
+    """The drive: what the machine has no number of is as in this set."""
+
+    def __call__(self, numbers: Mapping[str, Array]) -> Iterator[CheckedRule]:
+        """The rules applied to (m,) values by path."""
+        definitions = self.parameters.definitions
+        count = next(iter(numbers.values())).size
+        columns = {name: np.full(count, n) for name, n in self.parameters.numbers.items()}
+        defaults = Pump._field_defaults
+        for column, path in definitions.paths.items():
+            given = column in columns or np.any(numbers.get(path) != defaults.get(column))
+            if path in numbers and given:
+                columns[column] = numbers[path]
+        return check_rules(columns, definitions)
 
 
 def without_ripple(instance: Machine) -> Machine:

@@ -12,9 +12,9 @@ from swashplate.drive.equilibrium import OperatingPoint
 from swashplate.drive.instance import drive_instance
 from swashplate.drive.signals import UNITS
 from swashplate.drive.small_motion import Coulomb, lifted, small_motion_model
-from swashplate.equations.marching import Interpolation, least_substeps
 from swashplate.errors import DomainError, InputError
-from swashplate.linear import LinearModel, with_delay_line
+from swashplate.machine.linear import LinearModel, with_delay_line
+from swashplate.machine.marching import Interpolation, least_substeps
 from swashplate.parameters import ParameterSet
 from swashplate.results import Result
 from swashplate.tables import UNIT, Cell, Column, Table

@@ -10,9 +10,9 @@ import numpy as np
 
 from swashplate.drive.instance import drive_instance
 from swashplate.drive.simulation import Simulation
-from swashplate.equations import Machine, Stepper, with_replacements
-from swashplate.equations.marching import Interpolation, Record, Start
 from swashplate.errors import DomainError, InputError
+from swashplate.machine import Machine, Stepper, with_replacements
+from swashplate.machine.marching import Interpolation, Record, Start
 from swashplate.models.displacement_control import pressure_limits
 from swashplate.parameters import ParameterSet
 

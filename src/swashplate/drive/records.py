@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from typing import TypedDict
+from typing import TypedDict, Unpack
 
 from numpy.typing import ArrayLike
 
-from swashplate.equations import Machine, is_real
-from swashplate.equations.marching import Interpolation, Record, inputs_of
 from swashplate.errors import InputError
+from swashplate.machine import Machine
+from swashplate.machine.fields import is_real
+from swashplate.machine.marching import Interpolation, Record, Sampling, inputs_of
 from swashplate.maneuvers import Maneuver
 
 
@@ -28,17 +29,26 @@ def drive_records(
     machine: Machine,
     command: ArrayLike | Maneuver,
     rate: float,
+    **keywords: Unpack[RunKeywords],
+) -> dict[str, Record]:
+    """A drive's command and its measured inputs on the march's grid, checked."""
+    inputs, sampling = drive_inputs(machine, command, **keywords)
+    return inputs_of(machine, inputs, rate, **sampling)
+
+
+def drive_inputs(
+    machine: Machine,
+    command: ArrayLike | Maneuver,
     *,
     clip: bool = False,
     time: ArrayLike | None = None,
     interpolation: Interpolation | None = None,
     substeps: int | None = None,
     **measured: ArrayLike | None,
-) -> dict[str, Record]:
-    """A drive's command and its measured inputs on the march's grid, checked.
+) -> tuple[dict[str, ArrayLike | Maneuver], Sampling]:
+    """A drive's command and its measured inputs by name, and what they are between samples.
 
-    What was measured is a straight line between samples, whatever the command is. Pint quantities
-    are turned into SI.
+    What was measured is a straight line between samples, whatever the command is.
     """
     driver = machine.model.external[0]
     if is_real(command):
@@ -50,12 +60,10 @@ def drive_records(
     given = {name: values for name, values in measured.items() if values is not None}
     between: dict[str, Interpolation | None] = {driver: interpolation}
     between |= dict.fromkeys(given, "linear")
-    return inputs_of(
-        machine,
-        {driver: command, **given},
-        rate,
-        clip=clip,
-        time=time,
-        interpolation=between,
-        substeps=substeps,
-    )
+    sampling: Sampling = {
+        "clip": clip,
+        "time": time,
+        "interpolation": between,
+        "substeps": substeps,
+    }
+    return {driver: command, **given}, sampling

@@ -11,9 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swashplate.drive.signals import FIRST_SIGNALS, MOTOR, SIGNALS, UNITS
-from swashplate.equations import Run
-from swashplate.equations.marching import read_only
 from swashplate.errors import InputError
+from swashplate.machine import Run
+from swashplate.machine.marching import read_only
 from swashplate.models.displacement_control import PUBLISHED_FORMS, Pump
 from swashplate.results import Named, figures
 from swashplate.tables import UNIT, Column, Table, share_cell

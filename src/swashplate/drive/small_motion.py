@@ -16,9 +16,9 @@ from numpy.typing import NDArray
 
 from swashplate.drive.equilibrium import OperatingPoint
 from swashplate.drive.instance import drive_instance, models_of, without_ripple
-from swashplate.equations import Machine, with_replacements
-from swashplate.equations.marching import SOURCE_RATE, called
-from swashplate.linear import LinearModel, Matrices, linearize
+from swashplate.machine import Machine, with_replacements
+from swashplate.machine.linear import LinearModel, Matrices, linearize
+from swashplate.machine.marching import SOURCE_RATE, called
 from swashplate.models.amplifier import Card
 from swashplate.models.displacement_control import PumpOptions
 from swashplate.models.refinements import dither_factor, friction_width

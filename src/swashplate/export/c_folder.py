@@ -18,15 +18,6 @@ from swashplate.drive import (
     Drive,
     Sample,
 )
-from swashplate.equations import Machine, Model, declared_by
-from swashplate.equations.code_generation import (
-    c_comment,
-    c_literal,
-    c_name,
-    comment_line,
-    filled,
-)
-from swashplate.equations.marching import SOURCE_RATE, check_rate
 from swashplate.errors import FileError, InputError, InputTypeError
 from swashplate.export.c_source import Exported, interface, numbers, writer_of
 from swashplate.export.variable_list import (
@@ -37,6 +28,16 @@ from swashplate.export.variable_list import (
     References,
     descriptions_of,
 )
+from swashplate.machine import Machine, Model
+from swashplate.machine.code_generation import (
+    c_comment,
+    c_literal,
+    c_name,
+    comment_line,
+    filled,
+)
+from swashplate.machine.fields import declared_by
+from swashplate.machine.marching import SOURCE_RATE, check_rate
 from swashplate.models.drive import drive as drive_model
 from swashplate.parameters import ParameterSet
 from swashplate.tables import write_text

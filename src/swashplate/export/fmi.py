@@ -22,7 +22,6 @@ from numpy.typing import ArrayLike, NDArray
 
 from swashplate.__about__ import __version__
 from swashplate.drive import Drive
-from swashplate.equations import Machine, simulate, value_at
 from swashplate.errors import FileError, InputError
 from swashplate.export.c_folder import (
     LONGEST_STEP,
@@ -43,6 +42,8 @@ from swashplate.export.libraries import (
     sources,
 )
 from swashplate.export.variable_list import LONGEST_LINE, NONE, Variable, variables
+from swashplate.machine import Machine, simulate
+from swashplate.machine.fields import value_at
 from swashplate.results import Result
 from swashplate.tables import UNIT, Column, Table, write_bytes
 from swashplate.units import si_exponents, to_si

@@ -22,8 +22,6 @@ from typing import Any, NamedTuple
 
 from swashplate.documents import parse_toml
 from swashplate.drive import Drive
-from swashplate.equations import Machine
-from swashplate.equations.code_generation import filled
 from swashplate.errors import FileError, InputError
 from swashplate.export.c_folder import (
     LONGEST_STEP,
@@ -35,6 +33,8 @@ from swashplate.export.c_folder import (
 )
 from swashplate.export.c_source import Exported, interface
 from swashplate.export.variable_list import DRIVE, References, c_header
+from swashplate.machine import Machine
+from swashplate.machine.code_generation import filled
 from swashplate.tables import write_bytes
 
 NAME = "swashplate_drive"

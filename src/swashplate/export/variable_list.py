@@ -12,9 +12,10 @@ from dataclasses import dataclass, replace
 from math import inf, isfinite
 from typing import Any, Literal, NamedTuple
 
-from swashplate.equations import Definition, declared_by
-from swashplate.equations.code_generation import c_literal
 from swashplate.export.c_source import Exported
+from swashplate.machine import Definition
+from swashplate.machine.code_generation import c_literal
+from swashplate.machine.fields import declared_by
 
 Causality = Literal["input", "output", "parameter", "independent"]
 Variability = Literal["continuous", "tunable", "fixed"]

@@ -20,18 +20,19 @@ from swashplate.drive import (
     Drive,
     drive_records,
 )
-from swashplate.equations import BoundModel, Machine, Run, Sensitivities
-from swashplate.equations.marching import (
+from swashplate.errors import DomainError, InputError
+from swashplate.full_order.physical_set import QUANTITIES, PhysicalSet, from_lumped
+from swashplate.machine import Machine, Run, Sensitivities
+from swashplate.machine.linear import linearize
+from swashplate.machine.marching import (
     SOURCE_RATE,
+    BoundModel,
     Interpolation,
     PartNumbers,
     Start,
     least_substeps,
     read_only,
 )
-from swashplate.errors import DomainError, InputError
-from swashplate.full_order.physical_set import QUANTITIES, PhysicalSet, from_lumped
-from swashplate.linear import linearize
 from swashplate.models import full_order as model
 from swashplate.models.displacement_control import Solenoids
 from swashplate.models.drive import Source as CurrentSource

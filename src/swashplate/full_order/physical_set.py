@@ -18,14 +18,15 @@ import numpy as np
 
 from swashplate.documents import parse_toml, validated
 from swashplate.entries import FormerlyFormat
-from swashplate.equations import Definition, Flag, declared_by
 from swashplate.errors import ParameterError, UnknownParameterError
+from swashplate.machine import Definition, Flag
+from swashplate.machine.fields import declared_by
+from swashplate.machine.rules import CheckedRule, refuse
 from swashplate.models import machine as equations
 from swashplate.models.machine import Hydrostat
 from swashplate.parameters import (
     AXES,
     Change,
-    CheckedRule,
     Entries,
     HasParameters,
     Pair,
@@ -38,7 +39,6 @@ from swashplate.parameters import (
     check_range,
     meant_value,
     parameter_of,
-    refuse,
     set_of,
 )
 from swashplate.parameters import load_preset as load_parameters

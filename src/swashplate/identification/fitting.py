@@ -19,7 +19,6 @@ from numpy.typing import NDArray
 from swashplate.__about__ import __version__
 from swashplate.campaign import Campaign, Channel, Experiment
 from swashplate.drive import Drive
-from swashplate.equations import Model as Equations
 from swashplate.errors import InputError, UnknownNameError
 from swashplate.executors import Executor, Serial
 from swashplate.identification import tables
@@ -55,6 +54,7 @@ from swashplate.identification.estimation.stages import (
 from swashplate.identification.estimation.unknowns import Prior
 from swashplate.identification.stage_fit import Interval, StageFit
 from swashplate.identification.statistics.intervals import Estimate, uncertainty_of, weighed
+from swashplate.machine import Model as Equations
 from swashplate.parameters import SIDES, ParameterSet
 from swashplate.progress import LOGGER, working
 from swashplate.results import Tabular

@@ -12,8 +12,6 @@ import numpy as np
 
 from swashplate.campaign import Campaign, Experiment
 from swashplate.drive import Drive
-from swashplate.equations import Model as Equations
-from swashplate.equations import is_real
 from swashplate.errors import InputError, InputTypeError
 from swashplate.executors import Executor, Serial
 from swashplate.identification.assessment import Identification, versions
@@ -29,6 +27,8 @@ from swashplate.identification.fitting import Fit, Search, fit
 from swashplate.identification.resampling import cross_validate
 from swashplate.identification.stage_fit import StageFit
 from swashplate.identification.statistics.profiles import Profile, profiles_of
+from swashplate.machine import Model as Equations
+from swashplate.machine.fields import is_real
 from swashplate.parameters import ParameterSet, named_set
 
 MOST_EVALUATIONS = 600

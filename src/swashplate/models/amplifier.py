@@ -17,19 +17,9 @@ and C mean the same at every rate.
 from math import cos, exp, inf, pi, sin, sqrt
 from typing import Annotated, NamedTuple
 
-from swashplate.equations import (
-    OFF,
-    Definition,
-    Flag,
-    Model,
-    Tap,
-    Window,
-    declared,
-    equation,
-    faded,
-    interpolated,
-    soft_threshold,
-)
+from swashplate.machine import Definition, Flag, Model, Tap, Window, declared, equation
+from swashplate.machine.fields import OFF
+from swashplate.machine.library import faded, interpolated, soft_threshold
 
 COULOMB_WIDTH = 0.01
 """Rate of current below which the smooth Coulomb sign is proportional to it. [A/s]"""

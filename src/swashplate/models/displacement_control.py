@@ -16,17 +16,9 @@ term Z6, the plate's own motion, is absent while the plate rests on a stop.
 from math import asin, atan, inf, pi, sin, sqrt, tan
 from typing import Annotated, NamedTuple
 
-from swashplate.equations import (
-    MINUS,
-    OFF,
-    TAN_22_5,
-    Definition,
-    Flag,
-    arctangent,
-    declared,
-    equation,
-    small_arctangent,
-)
+from swashplate.machine import Definition, Flag, declared, equation
+from swashplate.machine.fields import MINUS, OFF
+from swashplate.machine.library import TAN_22_5, arctangent, small_arctangent
 
 WELL_CONDITIONED = 0.25
 """cos(φ+α) cos(φ-α) / cos²φ above which the form without a root in its denominator is used."""

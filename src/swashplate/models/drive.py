@@ -4,7 +4,7 @@ from dataclasses import replace
 from math import inf
 from typing import Annotated, NamedTuple
 
-from swashplate.equations import Definition, Model, equation, join
+from swashplate.machine import Definition, Model, equation, join
 from swashplate.models.amplifier import (
     Card,
     CardOptions,

@@ -14,7 +14,9 @@ below 2. Limits are projections: what is beyond a stop is put back on it and sto
 from math import atan, floor, tan
 from typing import NamedTuple
 
-from swashplate.equations import OFF, Flag, Model, clipped, equation, join, repeated, root
+from swashplate.machine import Flag, Model, equation, join, repeated, root
+from swashplate.machine.fields import OFF
+from swashplate.machine.library import clipped
 from swashplate.models.amplifier import card
 from swashplate.models.displacement_control import Solenoids, solenoid_force
 from swashplate.models.drive import AMMETER, POSITION, source

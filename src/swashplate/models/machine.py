@@ -13,7 +13,9 @@ eq. 6.38 has d4 alone, which would not conserve energy (erratum 16).
 from math import asin, atan, pi, sin, sqrt, tan
 from typing import Annotated, NamedTuple
 
-from swashplate.equations import MINUS, Definition, Flag, clipped, equation, root
+from swashplate.machine import Definition, Flag, equation, root
+from swashplate.machine.fields import MINUS
+from swashplate.machine.library import clipped
 from swashplate.models.displacement_control import flow_head, head_root
 
 ATMOSPHERE = 101325.0

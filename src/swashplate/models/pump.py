@@ -8,7 +8,7 @@ stand in the same sample and the same step; an option that is off leaves nothing
 from math import sqrt
 from typing import Annotated, NamedTuple
 
-from swashplate.equations import Definition, Model, equation, root
+from swashplate.machine import Definition, Model, equation, root
 from swashplate.models.amplifier import LONGEST_STEP
 from swashplate.models.displacement_control import (
     Pump,

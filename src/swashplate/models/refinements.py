@@ -41,7 +41,7 @@ stiff (k → ∞), which leaves Ω = Ω_0 - K_mL (C_g + J Ω').
 
 from math import exp, inf, sin, sqrt
 
-from swashplate.equations import declared, equation
+from swashplate.machine import declared, equation
 from swashplate.models.displacement_control import Pump
 
 

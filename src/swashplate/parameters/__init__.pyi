@@ -36,9 +36,7 @@ from .parameter_set import meant_value as meant_value
 from .parameter_set import set_of as set_of
 from .rules import FULL_VOLTAGE as FULL_VOLTAGE
 from .rules import SIDES as SIDES
-from .rules import CheckedRule as CheckedRule
 from .rules import ParameterRule as ParameterRule
 from .rules import apply_rule as apply_rule
 from .rules import check_range as check_range
 from .rules import check_rules as check_rules
-from .rules import refuse as refuse

@@ -14,9 +14,9 @@ from difflib import get_close_matches
 from functools import cached_property, lru_cache
 from typing import Literal, NamedTuple
 
-from swashplate.equations import Definition as Definition
-from swashplate.equations import declared_by
 from swashplate.errors import ParameterError, UnknownParameterError
+from swashplate.machine import Definition as Definition
+from swashplate.machine.fields import declared_by
 from swashplate.models.amplifier import Card
 from swashplate.models.displacement_control import Pump
 

@@ -18,14 +18,10 @@ from swashplate.entries import (
     Number,
     Positive,
 )
-from swashplate.equations import (
-    Replacement,
-    check_plausible,
-    replaced_once,
-    replacement_at,
-    uses_equation,
-)
 from swashplate.errors import InputError, MissingFileError, ParameterError, meant
+from swashplate.machine import Replacement
+from swashplate.machine.plausible import check_plausible
+from swashplate.machine.replacement import replaced_once, replacement_at, uses_equation
 from swashplate.parameters.definitions import Block, Definition, definitions_of, options_of
 from swashplate.parameters.parameter_set import (
     CardSwitch,

@@ -11,8 +11,11 @@ from typing import Any, Literal, NamedTuple, Protocol, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from swashplate.equations import Replacement, check_plausible, is_real
 from swashplate.errors import InputError, ParameterError
+from swashplate.machine import Replacement
+from swashplate.machine.fields import is_real
+from swashplate.machine.plausible import check_plausible
+from swashplate.machine.rules import refuse
 from swashplate.parameters.definitions import (
     CATALOGUE,
     COLUMNS,
@@ -23,7 +26,7 @@ from swashplate.parameters.definitions import (
     definitions_of,
     options_of,
 )
-from swashplate.parameters.rules import check_options, check_rules, refuse
+from swashplate.parameters.rules import check_options, check_rules
 from swashplate.results import Result
 from swashplate.tables import UNIT, Column, Table, listed
 from swashplate.units import Quantity, in_si, to_si

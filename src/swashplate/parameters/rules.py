@@ -13,8 +13,9 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from swashplate.equations import Derived, derive, equation
 from swashplate.errors import ParameterError
+from swashplate.machine import Derived, derive, equation
+from swashplate.machine.rules import CheckedRule
 from swashplate.models.amplifier import CardChannel, channel_level
 from swashplate.models.displacement_control import (
     Pump,
@@ -42,15 +43,6 @@ class ParameterRule(NamedTuple):
     """Which sets break it."""
     sentence: str
     """For a set that breaks it; the names in braces are those of the values."""
-
-
-class CheckedRule(NamedTuple):
-    """A rule applied to parameter sets."""
-
-    is_broken: Mask
-    """Which sets break it."""
-    sentence: Callable[[int], str]
-    """The sentence for a set by its index."""
 
 
 FULL_VOLTAGE = 10.0  # Largest command, either way. [V]
@@ -109,13 +101,6 @@ SIDE_RULES: tuple[ParameterRule, ...] = (
         "below 1: the solenoid would overpower the feedback spring; check Z19 to Z22, Z4 and Z5.",
     ),
 )
-
-
-def refuse(owner: str, rules: Iterator[CheckedRule]) -> None:
-    """Raise the sentence of the first rule that the first set breaks, as a `ParameterError`."""
-    for rule in rules:
-        if rule.is_broken[0]:
-            raise ParameterError(f"{owner}: {rule.sentence(0)}")
 
 
 def check_options(owner: str, options: frozenset[str], numbers: Mapping[str, float]) -> None:

@@ -51,7 +51,8 @@ from swashplate.crane.rope import (
     rope_step,
     set_off,
 )
-from swashplate.equations import StepContext, equation, inlined, kernel, step
+from swashplate.machine import equation, inlined, kernel
+from swashplate.machine.marching import StepContext, step
 from swashplate.parameters import FULL_VOLTAGE
 
 Array = NDArray[np.float64]

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swashplate.crane.kinematics import Geometry, Home, Shafts, boom_at, rope_length
-from swashplate.equations import kernel
+from swashplate.machine import kernel
 from swashplate.results import Result
 
 Array = NDArray[np.float64]

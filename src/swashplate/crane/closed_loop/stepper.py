@@ -28,9 +28,9 @@ from swashplate.crane.rope import (
     too_fast_sentence,
 )
 from swashplate.drive import Drive
-from swashplate.equations import CompiledStep, Machine, StepContext, compiled_step
-from swashplate.equations.marching import marched, stored_of
 from swashplate.errors import DomainError, InputError
+from swashplate.machine import Machine
+from swashplate.machine.marching import CompiledStep, StepContext, compiled_step, marched, stored_of
 from swashplate.parameters import FULL_VOLTAGE
 
 Array = NDArray[np.float64]

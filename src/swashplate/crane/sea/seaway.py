@@ -16,9 +16,9 @@ from numpy.typing import ArrayLike, NDArray
 from swashplate.crane.axes import check_names
 from swashplate.crane.rope import GRAVITY
 from swashplate.crane.sea.transfer_functions import CRANE_SHIP, MOTIONS, Hull, TransferFunctions
-from swashplate.equations import kernel
 from swashplate.errors import InputError
 from swashplate.logs import Series, TextOptions, read_series
+from swashplate.machine import kernel
 from swashplate.results import Result
 
 Array = NDArray[np.float64]

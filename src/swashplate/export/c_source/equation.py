@@ -7,8 +7,8 @@ from collections.abc import Mapping
 from types import MappingProxyType
 from typing import Any, NamedTuple
 
-from swashplate.equations import parsed
-from swashplate.equations.code_generation import (
+from swashplate.errors import EquationError
+from swashplate.machine.code_generation import (
     Loops,
     Option,
     Trace,
@@ -17,8 +17,8 @@ from swashplate.equations.code_generation import (
     leaves,
     scalar_function,
 )
-from swashplate.equations.graph import Node, names_in
-from swashplate.errors import EquationError
+from swashplate.machine.graph import Node, names_in
+from swashplate.machine.language import parsed
 
 
 class EquationInC(NamedTuple):

@@ -7,9 +7,6 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from typing import NamedTuple
 
-from swashplate.equations import Equation, Model, floats_of
-from swashplate.equations.code_generation import ascii_name, c_name, fresh_name
-from swashplate.equations.marching import TapOf, taps_of
 from swashplate.export.c_source.names import (
     ARGUMENTS,
     CONSTANTS,
@@ -19,6 +16,10 @@ from swashplate.export.c_source.names import (
     PART_MEMBERS,
     PUBLIC,
 )
+from swashplate.machine import Equation, Model
+from swashplate.machine.code_generation import ascii_name, c_name, fresh_name
+from swashplate.machine.fields import floats_of
+from swashplate.machine.marching import TapOf, taps_of
 
 
 class ExportedLimit(NamedTuple):

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from typing import get_type_hints
 
-from swashplate.equations import SignalSource, floats_of
-from swashplate.equations.code_generation import Loops, c_name
 from swashplate.export.c_source.exported import Exported
 from swashplate.export.c_source.structs import Structs
+from swashplate.machine import SignalSource
+from swashplate.machine.code_generation import Loops, c_name
+from swashplate.machine.fields import floats_of
 
 
 class Layout:

@@ -13,18 +13,12 @@ from typing import get_type_hints
 import numpy as np
 from numpy.typing import NDArray
 
-from swashplate.equations import (
-    Definition,
-    Link,
-    Machine,
-    SignalSource,
-    arguments_of,
-    declared_by,
-    graph,
-    parsed,
-    value_at,
-)
-from swashplate.equations.code_generation import (
+from swashplate.export.c_source.exported import Exported
+from swashplate.export.c_source.layout import Layout, path_of
+from swashplate.export.c_source.parts import PartInC
+from swashplate.export.c_source.structs import noted, notes_of, struct
+from swashplate.machine import Definition, Link, Machine, SignalSource, graph
+from swashplate.machine.code_generation import (
     GENERATING,
     C,
     CodeBlock,
@@ -36,12 +30,11 @@ from swashplate.equations.code_generation import (
     fresh_name,
     node_of,
 )
-from swashplate.equations.graph import names_in
-from swashplate.equations.marching import CodeForm, SampleCode, output_of
-from swashplate.export.c_source.exported import Exported
-from swashplate.export.c_source.layout import Layout, path_of
-from swashplate.export.c_source.parts import PartInC
-from swashplate.export.c_source.structs import noted, notes_of, struct
+from swashplate.machine.fields import declared_by, value_at
+from swashplate.machine.graph import names_in
+from swashplate.machine.language import parsed
+from swashplate.machine.marching import CodeForm, SampleCode, output_of
+from swashplate.machine.model import arguments_of
 
 Array = NDArray[np.float64]
 

@@ -5,8 +5,12 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from math import inf, isfinite
 
-from swashplate.equations import Definition
-from swashplate.equations.code_generation import (
+from swashplate.export.c_source.exported import Exported
+from swashplate.export.c_source.layout import path_of
+from swashplate.export.c_source.model import writer_of
+from swashplate.export.c_source.structs import noted, with_comment
+from swashplate.machine import Definition
+from swashplate.machine.code_generation import (
     HELPERS,
     c_function,
     c_literal,
@@ -18,10 +22,6 @@ from swashplate.equations.code_generation import (
     sections,
     wrapped,
 )
-from swashplate.export.c_source.exported import Exported
-from swashplate.export.c_source.layout import path_of
-from swashplate.export.c_source.model import writer_of
-from swashplate.export.c_source.structs import noted, with_comment
 
 TEXTS = sections(__package__, "interface.c.in")
 """Sections of the text around the equations, by name."""

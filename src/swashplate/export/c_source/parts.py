@@ -12,15 +12,9 @@ from inspect import getsource
 from types import MappingProxyType
 from typing import Any, get_type_hints
 
-from swashplate.equations import (
-    Equation,
-    Parsed,
-    SignalSource,
-    arguments_of,
-    defaults_of,
-    graph,
-)
-from swashplate.equations.code_generation import (
+from swashplate.export.c_source.layout import Layout, path_of
+from swashplate.machine import Equation, SignalSource, graph
+from swashplate.machine.code_generation import (
     FEW,
     STEMS,
     C,
@@ -39,9 +33,11 @@ from swashplate.equations.code_generation import (
     undecided,
     without_comments,
 )
-from swashplate.equations.graph import LEAVES, MATH_FUNCTIONS, Node, names_in, ordered
-from swashplate.equations.marching import PartCode
-from swashplate.export.c_source.layout import Layout, path_of
+from swashplate.machine.fields import defaults_of
+from swashplate.machine.graph import LEAVES, MATH_FUNCTIONS, Node, names_in, ordered
+from swashplate.machine.language import Parsed
+from swashplate.machine.marching import PartCode
+from swashplate.machine.model import arguments_of
 
 LIBRARY = {*MATH_FUNCTIONS} - {"sqrt", "floor"}
 """Functions of which libraries differ in the last bit, or that take long."""

@@ -7,14 +7,16 @@ import re
 from collections.abc import Iterable
 from typing import Any, get_type_hints
 
-from swashplate.equations import Definition, declared_by, is_named_tuple
-from swashplate.equations.code_generation import (
+from swashplate.machine import Definition
+from swashplate.machine.code_generation import (
     c_comment,
     c_name,
     comment_line,
     fresh_name,
     indented,
 )
+from swashplate.machine.fields import declared_by
+from swashplate.machine.language import is_named_tuple
 
 WIDTH = 100
 """Characters of a line."""

@@ -33,10 +33,15 @@ from swashplate.drive import (
     bound_drive,
     simulate_drive,
 )
-from swashplate.equations import BoundModel
-from swashplate.equations.marching import (
+from swashplate.errors import DomainError, InputError, ParameterError
+from swashplate.identification.estimation.model import EquationModel, SimulationRequest
+from swashplate.identification.estimation.problem import Problem
+from swashplate.identification.estimation.setup import Forces
+from swashplate.identification.estimation.unknowns import Prior, Unknown, Unknowns, zero_name
+from swashplate.machine.marching import (
     SLOWEST,
     SOURCE_RATE,
+    BoundModel,
     Interpolation,
     Observation,
     ObservedRecord,
@@ -46,11 +51,6 @@ from swashplate.equations.marching import (
     record_of,
     within_range,
 )
-from swashplate.errors import DomainError, InputError, ParameterError
-from swashplate.identification.estimation.model import EquationModel, SimulationRequest
-from swashplate.identification.estimation.problem import Problem
-from swashplate.identification.estimation.setup import Forces
-from swashplate.identification.estimation.unknowns import Prior, Unknown, Unknowns, zero_name
 from swashplate.models.drive import drive as drive_equations
 from swashplate.parameters import ParameterSet
 from swashplate.results import Result

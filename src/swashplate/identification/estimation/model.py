@@ -12,9 +12,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swashplate.campaign import CommandJump, Experiment
-from swashplate.equations import BoundModel, Machine, parameter_paths, state_paths, tuple_from
-from swashplate.equations import Model as Equations
-from swashplate.equations.marching import (
+from swashplate.errors import DomainError, InputError, meant
+from swashplate.machine import Machine
+from swashplate.machine import Model as Equations
+from swashplate.machine.fields import tuple_from
+from swashplate.machine.marching import (
+    BoundModel,
     Observation,
     ObservedRecord,
     Record,
@@ -23,7 +26,7 @@ from swashplate.equations.marching import (
     on_grid,
     started_by,
 )
-from swashplate.errors import DomainError, InputError, meant
+from swashplate.machine.model import parameter_paths, state_paths
 from swashplate.results import Result, short
 
 Array = NDArray[np.float64]

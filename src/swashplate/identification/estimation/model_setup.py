@@ -17,8 +17,6 @@ from numpy.typing import NDArray
 
 from swashplate.campaign import Channel, Experiment
 from swashplate.documents import validated
-from swashplate.equations import Model as Equations
-from swashplate.equations import check_mapping, check_plausible, is_real, parameter_paths
 from swashplate.errors import (
     FileError,
     InputError,
@@ -39,6 +37,10 @@ from swashplate.identification.estimation.setup import (
 )
 from swashplate.identification.estimation.solving import solve
 from swashplate.identification.estimation.unknowns import Unknown, Unknowns, zero_name
+from swashplate.machine import Model as Equations
+from swashplate.machine.fields import check_mapping, is_real
+from swashplate.machine.model import parameter_paths
+from swashplate.machine.plausible import check_plausible
 from swashplate.results import Result
 from swashplate.tables import listed
 

@@ -11,8 +11,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swashplate.campaign import Channel, Experiment
-from swashplate.equations import Model as OfEquations
-from swashplate.equations.marching import ObservedRecord
 from swashplate.errors import DomainError, InputError
 from swashplate.identification.estimation.arrow import (
     ArrowFactor,
@@ -35,13 +33,15 @@ from swashplate.identification.estimation.model import (
     simulated,
 )
 from swashplate.identification.estimation.unknowns import Unknowns
+from swashplate.machine import Model as OfEquations
+from swashplate.machine.marching import ObservedRecord
 from swashplate.results import Result, short
 from swashplate.tables import count
 
 if TYPE_CHECKING:
     from concurrent.futures import ThreadPoolExecutor
 
-    from swashplate.equations import BoundModel
+    from swashplate.machine.marching import BoundModel
 
 Array = NDArray[np.float64]
 Returned = TypeVar("Returned")

@@ -20,12 +20,12 @@ from pydantic import AfterValidator, Field, model_validator
 from swashplate.campaign import LARGEST_PRESSURE, ChannelKind, TimeWindow, WeightWindow
 from swashplate.documents import parse_toml, read_text, validated
 from swashplate.entries import SCHEMA, Document, FileTable, Finite, Flag, NotNegative, Positive
-from swashplate.equations import is_real
 from swashplate.errors import (
     ParameterError,
     meant,
 )
 from swashplate.identification.estimation.unknowns import Prior, Unknown
+from swashplate.machine.fields import is_real
 from swashplate.parameters import SIDES, Definitions, ParameterSet
 
 Array = NDArray[np.float64]

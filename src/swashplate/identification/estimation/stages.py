@@ -18,8 +18,6 @@ from numpy.typing import NDArray
 from swashplate.campaign import Campaign, Experiment, applying, inside
 from swashplate.documents import validated
 from swashplate.drive import Drive
-from swashplate.equations import check_plausible
-from swashplate.equations.marching import Record
 from swashplate.errors import InputError, UnknownParameterError
 from swashplate.executors import available_cores
 from swashplate.identification.estimation.drive_model import (
@@ -48,6 +46,8 @@ from swashplate.identification.estimation.setup import (
     setup_names,
 )
 from swashplate.identification.estimation.unknowns import Unknown, Unknowns, bounded
+from swashplate.machine.marching import Record
+from swashplate.machine.plausible import check_plausible
 from swashplate.parameters import (
     DEFINITIONS,
     FULL_VOLTAGE,

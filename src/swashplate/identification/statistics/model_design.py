@@ -13,7 +13,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swashplate.campaign import Experiment, SignalOrigin
-from swashplate.equations.marching import even_rate
 from swashplate.errors import InputError
 from swashplate.identification.estimation.arrow import triangular_factor
 from swashplate.identification.estimation.model_setup import ModelSetup
@@ -28,6 +27,7 @@ from swashplate.identification.statistics.experiment_design import (
     machine_unknowns,
     sensor_of_residuals,
 )
+from swashplate.machine.marching import even_rate
 from swashplate.maneuvers import Maneuver, multisine, sine, stairs, step
 from swashplate.results import Result
 

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from swashplate.errors import InputError
 from swashplate.full_order import SIGNAL_UNITS
-from swashplate.linear import FrequencyResponse, LinearModel
+from swashplate.machine.linear import FrequencyResponse, LinearModel
 from swashplate.report.style import (
     FAINT,
     GREY,

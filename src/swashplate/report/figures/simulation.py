@@ -14,9 +14,9 @@ from matplotlib.patches import Patch
 from numpy.typing import NDArray
 
 from swashplate.drive import Limit, Simulation
-from swashplate.equations import Definition, Run
 from swashplate.errors import InputError
 from swashplate.full_order import SIGNAL_UNITS, FullOrderSimulation, OrderComparison
+from swashplate.machine import Definition, Run
 from swashplate.maneuvers import Maneuver
 from swashplate.report.lines import (
     COLUMNS,

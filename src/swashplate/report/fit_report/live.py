@@ -23,11 +23,11 @@ from swashplate.campaign import (
     speed_of,
 )
 from swashplate.drive import Drive, Limit
-from swashplate.equations.marching import Record, record_of
 from swashplate.errors import InputError
 from swashplate.export import WASM, exported_drive, licensed, packaged, values_of
 from swashplate.identification import at_instants, ignored_windows
 from swashplate.identification.estimation import at_rate_of, voltage_record
+from swashplate.machine.marching import Record, record_of
 from swashplate.maneuvers import Maneuver
 from swashplate.parameters import HasParameters, Parameter, ParameterSet, set_of
 from swashplate.report.fit_report.html_page import LIVE_SCRIPTS, rendered, script_json
