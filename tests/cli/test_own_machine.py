@@ -362,7 +362,9 @@ REFUSED = {
     "bode own_tank.py --at bias=0 --at valve=1": "valve, ... --bias",
     "compare hoist own_tank.py": "own_tank.py is a model file, not a drive",
     "compensate own_tank.py:slow": "own_tank.py is a model file, not a drive",
-    "live own_tank.py --maneuver step:1": "sliders of a drive... own_tank.py",
+    "live own_tank.py --maneuver step:1": "tank needs bias [bar]... --measured bias=NUMBER",
+    "live own_tank.py camp.toml": "own_tank.py... shows a maneuver... --maneuver step:2",
+    "live hoist --maneuver step:9 --measured supply=1": "--measured is for a machine of your own",
     "show own_tank.py --toml": "--toml is for a drive",
     "fit own_tank.py": "own_tank.py is a model file, not a campaign... --model",
 }

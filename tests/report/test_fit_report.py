@@ -10,6 +10,7 @@ from base64 import b64decode
 from dataclasses import replace
 from html.parser import HTMLParser
 from pathlib import Path
+from typing import Annotated, NamedTuple
 
 import numpy as np
 import polars as pl
@@ -17,7 +18,20 @@ import pytest
 from tests.identification.given import virtual
 from tests.report.conftest import injected, policy_of, with_script
 
-from swashplate import Campaign, Drive, FileError, InputError, maneuvers
+from swashplate import (
+    Campaign,
+    Definition,
+    Drive,
+    FileError,
+    InputError,
+    Machine,
+    Model,
+    discretised,
+    equation,
+    maneuvers,
+    simulate,
+)
+from swashplate.export import libraries
 from swashplate.identification import (
     CrossValidation,
     Fit,
@@ -41,9 +55,11 @@ from swashplate.report.fit_report import (
     shown_runs,
     write_fit_report,
     write_live_page,
+    write_machine_page,
     write_samples,
     write_validation_report,
 )
+from swashplate.report.fit_report.live import SPAN
 from swashplate.report.fit_report.runs import packed_samples, run_data
 from swashplate.report.fit_report.summary import largest_commands, numbers_table
 
@@ -575,17 +591,17 @@ const wait = setInterval(() => {
   clearInterval(wait);
   const acting = [...live.latest.limits];
   const { limits } = JSON.parse(document.getElementById("live").textContent);
-  const made = { first: [...live.latest.signals.shaft_speed], before: live.latest.errors };
+  const made = { first: [...live.latest.seen.at(-1)], before: live.latest.errors };
   made.channels = live.figure.showing.run.shown.map(({ name }) => name);
   const acts = (bit) => acting.map((each) => (each & bit ? 1 : 0));
   made.limits = Object.fromEntries(limits.map(([bit, name]) => [name, acts(bit)]));
   act("LEVER"[0].toUpperCase() + "LEVER".slice(1), 0.75);
   made.factor = live.factors.get("LEVER");
-  made.moved = [...live.latest.signals.shaft_speed];
+  made.moved = [...live.latest.seen.at(-1)];
   made.errors = live.latest.errors;
   made.toml = document.getElementById("toml").textContent;
   document.body.dispatchEvent(new KeyboardEvent("keydown", { key: "r", bubbles: true }));
-  made.reset = [...live.latest.signals.shaft_speed];
+  made.reset = [...live.latest.seen.at(-1)];
   made.milliseconds = document.body.dataset.milliseconds;
   const textContent = JSON.stringify(made);
   document.body.append(Object.assign(document.createElement("pre"), { id: "made", textContent }));
@@ -628,6 +644,70 @@ def test_a_slider_gives_what_python_gives(tmp_path: Path, browsed) -> None:
     )
     assert line is not None, made["toml"]
     np.testing.assert_allclose([float(line[1]), float(line[2])], changed, rtol=1e-15)
+
+
+class Lag(NamedTuple):
+    time_constant: Annotated[float, Definition("time constant", "s", above=0.0)]
+    offset: float = 0.0
+
+
+class Tank(NamedTuple):
+    level: Annotated[float, Definition("level", "m")] = 0.0
+
+
+class TankLimits(NamedTuple):
+    low: Annotated[bool, Definition("below its </style> mark", "1")]
+    high: bool
+
+
+@equation
+def filled(
+    state: Tank, inflow: Annotated[float, Definition("inflow", "m/s")], leak: float, p: Lag
+) -> Tank:
+    return Tank((inflow - leak + p.offset - state.level) / p.time_constant)
+
+
+@equation
+def tank_limits(state: Tank) -> TankLimits:
+    return TankLimits(state.level < 0.1, state.level > 2.0)
+
+
+TANK = Machine(Model("tank", Lag, Tank, discretised(filled, "rk4"), limits=tank_limits), Lag(0.5))
+MACHINE_ACTS = ACTS.replace(
+    '"LEVER"[0].toUpperCase() + "LEVER".slice(1)', '"time_constant: time constant"'
+)
+
+
+@pytest.mark.slow
+def test_a_page_runs_a_machine_of_its_user_s(tmp_path: Path, browsed, monkeypatch) -> None:
+    if not libraries.has_zig():
+        pytest.skip("ziglang is not installed")
+    page, command = tmp_path / "tank.html", parse("step:3,stop=4,length=5")
+    assert write_machine_page(TANK, page, {"inflow": command, "leak": 0.5}, 100.0) == ()
+    monkeypatch.setitem(globals(), "ACTS", MACHINE_ACTS)
+    made = acted(page, tmp_path, browsed)
+    inflow = command.sample(100.0).astype(np.float32).astype(float)
+    inputs = {"inflow": inflow, "leak": 0.5}
+    run = simulate(TANK, inputs, 100.0)
+    np.testing.assert_allclose(made["first"], run["level"], rtol=0.0, atol=1e-14)
+    assert made["limits"]["limit-0"] == run.active("low").astype(int).tolist()
+    assert sum(made["limits"]["limit-1"]) > 10
+    name, value = re.fullmatch(r"--set (\w+)=(\S+)", made["toml"]).groups()
+    assert float(value) == pytest.approx(0.5 * SPAN**0.5)  # three quarters of the slider
+    moved = simulate(TANK.replace({name: float(value)}), inputs, 100.0)
+    np.testing.assert_allclose(made["moved"], moved["level"], rtol=0.0, atol=1e-14)
+    assert made["reset"] == made["first"]
+
+
+def test_a_machine_s_page_needs_a_command(tmp_path: Path) -> None:
+    page = tmp_path / "tank.html"
+    with pytest.raises(InputError, match="tank needs the signal 'leak'"):
+        write_machine_page(TANK, page, {"inflow": parse("step:1")})
+    with pytest.raises(InputError, match="one of the inputs must be a maneuver"):
+        write_machine_page(TANK, page, {"inflow": 1.0, "leak": 0.5})
+    with pytest.raises(InputError, match="no input 'outflow'"):
+        write_machine_page(TANK, page, {"outflow": parse("step:1")})
+    assert not page.exists()
 
 
 @pytest.fixture(scope="module")

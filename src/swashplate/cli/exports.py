@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
@@ -21,11 +21,12 @@ from swashplate.cli.options import (
 )
 from swashplate.cli.parsing import campaign_of, drive_file
 from swashplate.cli.terminal import check_free, note, save, spinner
-from swashplate.cli.trials import named_maneuver
+from swashplate.cli.trials import commanded_inputs, named_maneuver
 from swashplate.errors import InputError
 from swashplate.tables import PAGE, Form, check_folder
 
 if TYPE_CHECKING:
+    from swashplate.cli.machines import OwnMachine
     from swashplate.drive import Drive
     from swashplate.machine import Machine
 
@@ -165,6 +166,7 @@ def texts_of_warnings() -> Iterator[None]:
         swashplate live fitted harbour/campaign.toml
         swashplate live hoist --maneuver step:9 --out hoist.html
         swashplate live fitted harbour/campaign.toml --scale orifice=1.5
+        swashplate live valve.py --maneuver step:2 --measured supply=100
     """,
 )
 def live(
@@ -181,21 +183,31 @@ def live(
         str | None,
         typer.Option(metavar="NAME", help="Maneuver to simulate in place of tests: step:9."),
     ] = None,
+    measured: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="NAME=NUMBER",
+            help=(
+                "Further input of a machine of your own, a number in SI units or a maneuver; may "
+                "be repeated."
+            ),
+        ),
+    ] = None,
     out: Annotated[Path, new_file(PAGE, "Page: .html.")] = Path("live.html"),
     force: Force = False,
 ) -> None:
-    """Write a page that simulates the drive, with sliders for its parameters.
+    """Write a page that simulates a machine, with sliders for its parameters.
 
     A single file that works offline: open it in a browser, move a slider, and
     the simulated curves, their errors and the limits follow. Changed values are
-    listed as lines for the drive's parameter file.
+    listed as lines for the drive's parameter file, or as options of the other
+    commands. A machine of your own is compiled and shows a maneuver.
     """
     if drive.own is not None:
-        raise InputError(
-            f"{drive.title}: a live page has the sliders of a drive; see other numbers of a "
-            f"machine of your own with 'swashplate simulate {drive.drive} ... --set NAME=VALUE "
-            "--plot FILE', or give it away as an FMU with 'swashplate export'."
-        )
+        _own_live_page(drive.own, path, maneuver, measured or (), out)
+        return
+    if measured:
+        raise InputError("--measured is for a machine of your own; a drive shows --maneuver alone.")
     if (path is None) == (maneuver is None):
         raise InputError("Name either a campaign, or a maneuver with --maneuver.")
     with spinner("Writing the page"):
@@ -216,6 +228,31 @@ def live(
             command = named_maneuver(maneuver or "", drive.loaded_drive)
             sentences = write_live_page(drive.loaded_drive, out, command=command, name=name)
     drive.warn()
-    for sentence in (*drive.changes, *sentences):
+    _note_page(out, [*drive.changes, *sentences])
+
+
+def _own_live_page(
+    own: OwnMachine, path: Path | None, maneuver: str | None, measured: Sequence[str], out: Path
+) -> None:
+    """Write the live page of a machine of a user's own under a maneuver."""
+    if path is not None or maneuver is None:
+        raise InputError(
+            f"{own.title}: the live page of a machine of your own shows a maneuver, not tests: "
+            "write --maneuver step:2."
+        )
+    with spinner("Writing the page"):
+        from swashplate.report.fit_report import write_machine_page
+
+        rate = own.steps_a_second()
+        inputs = commanded_inputs(own, maneuver, measured, rate)
+        sentences = write_machine_page(own.machine, out, inputs, rate)
+    if own.stated:
+        sentences += (f"The page starts at rest: {', '.join(sorted(own.stated))} left out.",)
+    _note_page(out, [*own.changes, *sentences])
+
+
+def _note_page(out: Path, sentences: Iterable[str]) -> None:
+    """Say what a page leaves out or changes, and where it is."""
+    for sentence in sentences:
         note(sentence)
     note(f"Page: {out} ({out.stat().st_size / 1e3:.0f} kB)")

@@ -8,7 +8,7 @@ from contextlib import redirect_stdout
 from dataclasses import dataclass, field, replace
 from math import isnan
 from pathlib import Path
-from typing import TYPE_CHECKING, NamedTuple, cast, get_type_hints
+from typing import TYPE_CHECKING, NamedTuple, cast
 
 from swashplate.cli.parsing import MachineWord, assignments_of, fitted_numbers
 from swashplate.errors import InputError, UnknownNameError
@@ -67,8 +67,7 @@ class OwnMachine:
     def needed(self) -> tuple[str, ...]:
         """Inputs without which it cannot run, in their order."""
         model = self.model
-        defaults = {part.tap(name).signal for part in model.parts for name in part.defaults}
-        return tuple(name for name in model.external if name not in defaults)
+        return tuple(name for name in model.external if name not in model.input_parameters)
 
     def driven(self, given: Collection[str] = ()) -> str:
         """Its first input that is not given otherwise, which drives it if none is named."""
@@ -408,7 +407,7 @@ def limits_table(own: OwnMachine, run: Run | None = None) -> Table:
     """Limits that the model declares and ranges of its signals; with a run the time of each."""
     of_run = (Column("share of time", ".1%"),) if run is not None else ()
     table = Table("", (Column("limit"), Column("meaning", wrap=True), *of_run))
-    for name, meaning in limit_meanings(own.model).items():
+    for name, meaning in own.model.limit_meanings.items():
         share = [share_cell(float(run.active(name).mean()))] if run is not None else []
         table.add(name, meaning, *share)
     for name, definition in own.model.definitions.items():
@@ -423,16 +422,3 @@ def limits_table(own: OwnMachine, run: Run | None = None) -> Table:
         unit = f" {unit_text(definition.unit)}" if unit_text(definition.unit) else ""
         table.add(f"range of {name}", f"{definition.name}: {definition.range}{unit}", *share)
     return table
-
-
-def limit_meanings(model: Model) -> dict[str, str]:
-    """What each limit of a model means, by its name; empty where the model does not say it."""
-    from swashplate.machine.fields import definition_of
-
-    meanings = dict[str, str]()
-    for name, (index, _) in model.limit_bits.items():
-        part = model.parts[index]
-        hints = get_type_hints(get_type_hints(part.limits)["return"], include_extras=True)
-        definition = definition_of(hints[name.rpartition(".")[2]])
-        meanings[name] = definition.name if definition else ""
-    return meanings

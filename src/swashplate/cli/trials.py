@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from difflib import get_close_matches
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -239,23 +239,15 @@ def own_run(own: OwnMachine, command: str, options: Simulating) -> tuple[str, Ru
     """
     from swashplate.machine import simulate
     from swashplate.machine.marching import even_rate
-    from swashplate.maneuvers import Maneuver, parse
 
-    is_log = _is_file(command)
-    log = _checked_log(command) if is_log else None
-    others = _other_inputs(own, options.measured or (), command if is_log else "", options)
     rate = options.stated_rate or own.rate
     time = None
-    inputs = dict[str, Any](others)
-    if log is None:
-        driven = own.driven(others)
-        if driven in others:
-            raise InputError(f"--measured gives {driven}, which {command} drives: leave one out.")
-        maneuver = parse(command)
-        stamps = maneuver.time(rate or options.rate)
-        inputs = {driven: maneuver, **others}
-        name = maneuver.name if own.unit(driven) in ("", "V") else command  # a maneuver's is in V
+    if not _is_file(command):
+        inputs = commanded_inputs(own, command, options.measured or (), rate or options.rate)
+        name = command_name(own, command, inputs)
     else:
+        log = _checked_log(command)
+        others = _other_inputs(own, options.measured or (), command, options)
         name = Path(command).name
         columns = _columns_of_inputs(own, log, options)
         series = {each: _series(own, command, each, columns[each], options) for each in columns}
@@ -266,11 +258,9 @@ def own_run(own: OwnMachine, command: str, options: Simulating) -> tuple[str, Ru
                 f"{' or '.join(own.model.external)}, or write --measured {own.driven()}=COLUMN."
             )
         _check_interpolation(command, options)
-        stamps = time = next(iter(series.values())).time
+        time = next(iter(series.values())).time
         rate = rate or even_rate(time)
-    # the command says how long the run is
-    inputs |= {key: other(stamps) for key, other in others.items() if isinstance(other, Maneuver)}
-    own.check_needed([*inputs], "--measured")
+        own.check_needed([*inputs], "--measured")
     run = simulate(
         own.machine,
         inputs,
@@ -283,6 +273,34 @@ def own_run(own: OwnMachine, command: str, options: Simulating) -> tuple[str, Ru
         begin=own.begin,
     )
     return name, run
+
+
+def commanded_inputs(
+    own: OwnMachine, command: str, assignments: Sequence[str], rate: float
+) -> dict[str, Any]:
+    """Inputs of a machine: a maneuver of the first that is not given otherwise, and the others.
+
+    Other maneuvers are sampled at the rate [Hz] for as long as the command lasts.
+    """
+    from swashplate.maneuvers import Maneuver, parse
+
+    others = _other_inputs(own, assignments)
+    driven = own.driven(others)
+    if driven in others:
+        raise InputError(f"--measured gives {driven}, which {command} drives: leave one out.")
+    maneuver = parse(command)
+    stamps = maneuver.time(rate)
+    sampled = {key: other(stamps) for key, other in others.items() if isinstance(other, Maneuver)}
+    inputs = {driven: maneuver, **others, **sampled}
+    own.check_needed([*inputs], "--measured")
+    return inputs
+
+
+def command_name(own: OwnMachine, command: str, inputs: Mapping[str, Any]) -> str:
+    """What a command is called: its own name is in volts."""
+    driven, maneuver = next(iter(inputs.items()))
+    name: str = maneuver.name
+    return name if own.unit(driven) in ("", "V") else command
 
 
 def _columns_of_inputs(own: OwnMachine, log: Log, options: CommandSampling) -> dict[str, str]:
@@ -319,7 +337,10 @@ def _series(own: OwnMachine, file: str, name: str, column: str, options: Command
 
 
 def _other_inputs(
-    own: OwnMachine, assignments: Sequence[str], log: str, options: CommandSampling
+    own: OwnMachine,
+    assignments: Sequence[str],
+    log: str = "",
+    options: CommandSampling | None = None,
 ) -> dict[str, Any]:
     """Inputs that are given by name: a number, a maneuver or a column of a log."""
     from swashplate.cli.parsing import pairs_of
@@ -331,7 +352,7 @@ def _other_inputs(
         word = text.strip()
         if word[:1].isdigit() or word[:1] in ("+", "-", "."):
             inputs |= own.constants("--measured", [f"{full}={word}"])
-        elif log:
+        elif options is not None:
             inputs[full] = _series(own, log, full, word, options).values
         else:
             inputs[full] = parse(word)

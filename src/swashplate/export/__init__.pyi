@@ -5,14 +5,15 @@ from .c_folder import content_of as content_of
 from .c_folder import drive_sources as drive_sources
 from .c_folder import exported_drive as exported_drive
 from .c_folder import values_of as values_of
+from .c_source import Exported as Exported
 from .fmi import FmuComparison as FmuComparison
 from .fmi import compare as compare
 from .fmi import fmu as fmu
 from .libraries import PLATFORMS as PLATFORMS
-from .libraries import WASM as WASM
 from .libraries import compiled_c as compiled_c
 from .libraries import licensed as licensed
 from .libraries import packaged as packaged
 from .libraries import wasm as wasm
+from .libraries import webassembly as webassembly
 from .variable_list import Variable as Variable
 from .variable_list import variables as variables

@@ -241,9 +241,13 @@ def wasm(
     """
     content = content_of(what, step)
     numbers = content.values.astype("<f8").tobytes()
-    code = packaged(WASM) if content.packaged else compiled_wasm(sources(content))
-    write_bytes(licensed(code) + _section(VALUES_SECTION, numbers), path)
+    write_bytes(licensed(webassembly(content)) + _section(VALUES_SECTION, numbers), path)
     return Path(path)
+
+
+def webassembly(content: Content) -> bytes:
+    """WebAssembly of what is exported, the package's if it has it; else it is compiled."""
+    return packaged(WASM) if content.packaged else compiled_wasm(sources(content))
 
 
 def licensed(module: bytes) -> bytes:

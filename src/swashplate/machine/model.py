@@ -302,6 +302,28 @@ class Model:
         return bits
 
     @cached_property
+    def limit_meanings(self) -> dict[str, str]:
+        """What each limit means, by its name; empty where the model does not say it."""
+        meanings = dict[str, str]()
+        for name, (index, _) in self.limit_bits.items():
+            returned = get_type_hints(self.parts[index].limits)["return"]
+            hints = get_type_hints(returned, include_extras=True)
+            definition = definition_of(hints[name.rpartition(".")[2]])
+            meanings[name] = definition.name if definition else ""
+        return meanings
+
+    @cached_property
+    def input_parameters(self) -> dict[str, str]:
+        """Inputs that may be left out, with the path of the parameter that then stands for each."""
+        replaceable = dict[str, str]()
+        for index, part in enumerate(self.parts):
+            for name in part.input_types:
+                if self.link_of(index, name) is None and name in part.defaults:
+                    path = f"{self.prefix(index)}{part.defaults[name]}"
+                    replaceable[part.tap(name).signal] = path
+        return replaceable
+
+    @cached_property
     def external(self) -> tuple[str, ...]:
         """Signals that come from outside, in the order of the parts' inputs."""
         inputs = [(i, name) for i, part in enumerate(self.parts) for name in part.input_types]

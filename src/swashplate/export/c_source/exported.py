@@ -199,12 +199,7 @@ class Exported:
     @cached_property
     def measured(self) -> tuple[str, ...]:
         """External signals that a parameter replaces if they are not given."""
-        replaceable: dict[str, None] = {}
-        for part_index, part in enumerate(self.model.parts):
-            for name in part.input_types:
-                if self.model.link_of(part_index, name) is None and name in part.defaults:
-                    replaceable[part.tap(name).signal] = None
-        return tuple(replaceable)
+        return tuple(self.model.input_parameters)
 
     @cached_property
     def names(self) -> tuple[str, ...]:

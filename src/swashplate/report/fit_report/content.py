@@ -50,7 +50,7 @@ from swashplate.report.fit_report.html_page import (
     text,
     titled,
 )
-from swashplate.report.fit_report.live import can_run, live_page, run_of
+from swashplate.report.fit_report.live import can_run, drive_on_page, live_page, run_of
 from swashplate.report.fit_report.runs import ShownRun, measures_line, run_data, shown_runs
 from swashplate.report.fit_report.summary import light, run_error, run_lights, summary_section
 from swashplate.tables import NONE, Cell, Column, Table, count, ended, joined, listed, write_text
@@ -328,13 +328,9 @@ def _live_section(fit: Fit, campaign: Campaign, runs: Sequence[ShownRun]) -> Sec
     worst_run = max(held_out or runs, key=lambda run: run_error(run, runs)).experiment
     if not can_run(drive, worst_run):
         return section
-    page = live_page(
-        drive,
-        [run_of(at_instants(drive, worst_run))],
-        campaign.title,
-        campaign.virtual,
-        "drive.toml",
-    )
+    run = run_of(at_instants(drive, worst_run))
+    machine = drive_on_page(drive, run["step"], "drive.toml")
+    page = live_page(machine, [run], campaign.title, virtual=campaign.virtual)
     caption = f"Sliders for every parameter, next to {worst_run.name}"
     return replace(section, blocks=[PageBlock("live", page, caption)])
 

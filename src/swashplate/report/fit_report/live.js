@@ -49,13 +49,22 @@
  */
 
 /**
+ * An input of a run, as `live._input` of Python writes it.
+ * @typedef {object} InputData
+ * @property {string} label
+ * @property {number} factor From SI to the unit that is shown.
+ * @property {boolean} shown Whether it has a panel.
+ * @property {string} values Of four bytes each, the lowest bytes first; deflated and in base64.
+ */
+
+/**
  * A run, as `live.run_of` of Python writes it.
  * @typedef {object} RunData
  * @property {string} name
  * @property {string} role
  * @property {number} start In s.
  * @property {number} step In s.
- * @property {string} voltage Of four bytes each, the lowest bytes first; deflated and in base64.
+ * @property {InputData[]} inputs In the order in which the machine's C takes them.
  * @property {boolean} [steady] Whether it begins in the steady state.
  * @property {(ShownData & MeasuredData)[]} channels
  */
@@ -64,19 +73,20 @@
  * All that `live.live_page` of Python hands over.
  * @typedef {object} LiveData
  * @property {string} wasm
- * @property {string} values Of the drive: doubles in base64.
+ * @property {string} values Of the machine: doubles in base64.
  * @property {ParameterData[]} parameters
  * @property {DesignVariableData[]} design_variables
  * @property {{ name: string, number: number }[]} outputs
  * @property {[bit: number, name: string][]} limits
  * @property {string} before What the values at first are called.
+ * @property {boolean} as_options Whether changed values are options of a command, not lines of a file.
  * @property {{ low: number, high: number }} filter Angular frequencies of the filters of a speed.
  * @property {ShownData[]} unmeasured What is shown of a run without channels.
  * @property {RunData[]} runs
  */
 
 /**
- * What the compiled drive exports: statuses, of which 0 is well, and addresses in its memory.
+ * What the compiled machine exports: statuses, of which 0 is well, and addresses in its memory.
  * @typedef {object} MachineExports
  * @property {WebAssembly.Memory} memory
  * @property {(count: number) => number} swp_page_values
@@ -145,7 +155,7 @@ function digits(value, count = 4) {
 
 // --- the drive ---
 
-/** A drive of the compiled source: parameters by number, and runs over a voltage on an even grid. */
+/** A machine of the compiled source: parameters by number, and runs over inputs on an even grid. */
 class Machine {
   /** @param {MachineExports} exports */
   constructor(exports) {
@@ -201,21 +211,24 @@ class Machine {
    * @param {Run} run
    * @returns {{ signals: Signals, limits: Uint8Array } | Refusal}
    */
-  simulate({ voltage, step, steady, shown }) {
-    // what the run's channels are compared with, and the speed
-    const names = new Set(["shaft_speed"]);
+  simulate({ inputs, step, steady, shown }) {
+    // what the run's channels are compared with
+    /** @type {Set<string>} */
+    const names = new Set();
     for (const { signal, measured } of shown) {
       names.add(signal);
       if (measured) names.add(measured.also);
     }
     const outputs = data.outputs.filter(({ name }) => names.has(name));
-    const count = voltage.length;
+    const count = inputs[0].values.length;
     const wrong = this.c.swp_page_begin(count, step, outputs.length);
     if (wrong) return { wrong: this.sentence(wrong) };
     outputs.forEach(({ number }, row) => {
       this.c.swp_page_select(row, number);
     });
-    this.doubles(this.c.swp_page_input(0), count).set(voltage);
+    inputs.forEach(({ values }, which) => {
+      this.doubles(this.c.swp_page_input(which), count).set(values);
+    });
     const status = this.c.swp_page_run(steady ? 1 : 0);
     if (status) return { wrong: this.sentence(status) };
     /** @type {Signals} */
@@ -332,16 +345,16 @@ class Measured {
 class Run {
   /**
    * @param {RunData} run
-   * @param {Float64Array} voltage
+   * @param {Float64Array[]} values Of its inputs, SI.
    */
-  constructor(run, voltage) {
+  constructor(run, values) {
     this.name = run.name;
     this.role = run.role;
     this.start = run.start;
     this.step = run.step;
     this.steady = run.steady ?? false;
-    this.voltage = voltage;
-    this.grid = Float64Array.from(voltage, (_, row) => run.start + row * run.step);
+    this.inputs = run.inputs.map((input, which) => ({ ...input, values: values[which] }));
+    this.grid = Float64Array.from(values[0], (_, row) => run.start + row * run.step);
     this.isMeasured = run.channels.length > 0;
     /** @type {Shown[]} */
     this.shown = this.isMeasured
@@ -423,15 +436,18 @@ class LiveFigure extends Figure {
     /** @type {Set<number>} */
     const none = new Set();
     /** @type {Panel[]} */
-    const panels = [
-      {
+    const panels = [];
+    for (const { label, factor, shown, values } of run.inputs) {
+      if (!shown) continue;
+      const line = factor === 1 ? values : values.map((value) => value * factor);
+      panels.push({
         kind: "input",
-        label: "command\n(V)",
+        label,
         time: run.grid,
         breaks: none,
-        lines: [["input", run.voltage]],
-      },
-    ];
+        lines: [["input", line]],
+      });
+    }
     run.shown.forEach(({ measured, factor, label, residual, shaded }, number) => {
       // in the units that are shown, once for what stays: the run before, and all where the pointer reads
       /** @param {Simulated} simulated */
@@ -619,7 +635,7 @@ class Page {
   }
 
   /**
-   * A run with the present values, seen by its channels; without channels, the speed itself.
+   * A run with the present values, seen by its channels; without channels, the signals themselves.
    * @param {number} number
    * @returns {Simulated | Refusal}
    */
@@ -684,6 +700,12 @@ class Page {
   changes() {
     const values = this.now();
     const changed = data.parameters.filter(({ number, value }) => values.get(number) !== value);
+    element("copied", HTMLElement).hidden = !changed.length;
+    if (data.as_options) {
+      const options = changed.map(({ column, number }) => `--set ${column}=${values.get(number)}`);
+      this.toml.textContent = options.join(" ");
+      return;
+    }
     /** @type {Map<string, Set<string>>} */
     const blocks = new Map();
     for (const { block, symbol } of changed) {
@@ -701,7 +723,6 @@ class Page {
       lines.push("");
     }
     this.toml.textContent = lines.join("\n").trim();
-    element("copied", HTMLElement).hidden = !changed.length;
   }
 
   /** The table of all runs, now and before. */
@@ -748,7 +769,10 @@ async function begin() {
   const channels = data.runs.flatMap((run) => run.channels);
   await inflate(channels.flatMap(({ time, measured }) => [time, measured]));
   const runs = await Promise.all(
-    data.runs.map(async (run) => new Run(run, voltages(await inflated(run.voltage)))),
+    data.runs.map(async (run) => {
+      const packed = await Promise.all(run.inputs.map(({ values }) => inflated(values)));
+      return new Run(run, packed.map(samples));
+    }),
   );
   const exports = /** @type {MachineExports} */ (/** @type {unknown} */ (machine.instance.exports));
   // for whoever looks into the page by the browser's console
@@ -760,7 +784,7 @@ async function begin() {
  * Numbers of four bytes each, of which all lowest bytes came first.
  * @param {Uint8Array} planes
  */
-function voltages(planes) {
+function samples(planes) {
   const count = planes.length / 4;
   const bytes = new Uint8Array(planes.length);
   for (let plane = 0; plane < 4; plane++) {

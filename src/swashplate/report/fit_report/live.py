@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 from base64 import b64encode
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
 from math import isfinite
 from pathlib import Path
 from typing import Any
 from zlib import compress
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from swashplate.analysis import DESIGN_VARIABLES
 from swashplate.campaign import (
@@ -24,10 +25,13 @@ from swashplate.campaign import (
 )
 from swashplate.drive import Drive, Limit
 from swashplate.errors import InputError
-from swashplate.export import WASM, exported_drive, licensed, packaged, values_of
+from swashplate.export import Exported, content_of, licensed, webassembly
 from swashplate.identification import at_instants, ignored_windows
 from swashplate.identification.estimation import at_rate_of, voltage_record
-from swashplate.machine.marching import Record, record_of
+from swashplate.machine import Definition, Machine
+from swashplate.machine.fields import is_real
+from swashplate.machine.marching import Record, inputs_of
+from swashplate.machine.model import full_name
 from swashplate.maneuvers import Maneuver
 from swashplate.parameters import HasParameters, Parameter, ParameterSet, set_of
 from swashplate.report.fit_report.html_page import LIVE_SCRIPTS, rendered, script_json
@@ -45,8 +49,38 @@ SHOWN = ("orifice", "pump", "supply_pressure", "rate_limits", "dead_zone", "spoo
 """Design variables that have a slider of their own; each parameter has one too."""
 BEFORE_CURRENT = Limit.DEAD_ZONE | Limit.CURRENT_RATE
 """Limits that are shaded in a panel of a current; the others are shaded in those of the pump."""
+COLOURS = (*(shade.color for shade in SHADES.values()), "#d9d2f0", "#d8e4a8")
+"""Of the limits of a machine; its code has a bit for no more."""
+MOST_PANELS = 8
+"""Signals of a machine that are shown."""
+NO_LIMIT = 1e30
+"""What stands for an infinite number."""
+PLAIN = DisplayUnit("", 1.0)
+COMMAND = "command (V)"
+"""Label of a drive's input."""
 UNMEASURED = ("current", "shaft_speed")
 """Signals that are shown of a command without measured signals."""
+
+
+@dataclass(frozen=True)
+class PageMachine:
+    """A machine as a page runs it: its code and numbers, its sliders and what is shown of it."""
+
+    title: str
+    code: bytes
+    """WebAssembly."""
+    values: Array
+    """Numbers that it begins with; see `Content.values`."""
+    parameters: Sequence[Mapping[str, Any]]
+    """A slider each; see `_slider`."""
+    design_variables: Sequence[Mapping[str, Any]]
+    outputs: Sequence[str]
+    limits: Sequence[Mapping[str, Any]]
+    """Bit, class, words and colour of each."""
+    panels: Sequence[Mapping[str, Any]]
+    """Signals that are shown of a run without channels; see `_signal_panel`."""
+    file: str = ""
+    """Of a drive, the file that changed values belong to."""
 
 
 def write_live_page(
@@ -67,7 +101,8 @@ def write_live_page(
     Parameters
     ----------
     drive : Drive, ParameterSet or a fit
-        What the sliders begin at.
+        What the sliders begin at. One with a user-defined equation is compiled, which needs the
+        extra ``binaries``.
     path : path
         The file, which replaces an older one.
     campaign : Campaign, optional
@@ -90,7 +125,7 @@ def write_live_page(
     ------
     InputError
         If there is nothing to simulate: no run is driven by a voltage, or neither a campaign nor a
-        command is given; or the drive has a user-defined equation.
+        command is given; or a compiler is needed and missing.
     FileError
         If the file cannot be written.
 
@@ -116,46 +151,101 @@ def write_live_page(
                 f"Left out, driven by something else than a voltage: {listed(left_out)}.",
             )
         runs = [run_of(at_instants(parameters, experiment)) for experiment in driven]
-        page = live_page(parameters, runs, campaign.title, campaign.virtual, name)
+        title, virtual = campaign.title, campaign.virtual
     elif command is not None:
-        record = record_of(command.sample(rate), rate, what="voltage")
-        sentences = ()
-        run = {**_record(record), "name": command.name, "role": "", "channels": []}
-        page = live_page(parameters, [run], parameters.title or parameters.name, False, name)
+        runs = [_run_under(Drive(parameters), {"voltage": command}, rate, {"voltage": COMMAND})]
+        title, virtual, sentences = parameters.title or parameters.name, False, ()
     else:
         raise InputError("A live page needs the runs of a campaign, or a command to simulate.")
-    write_text(page, path)
+    page = drive_on_page(parameters, runs[0]["step"], name)
+    write_text(live_page(page, runs, title, virtual=virtual), path)
     return sentences
 
 
+def write_machine_page(
+    machine: Machine,
+    path: str | Path,
+    inputs: Mapping[str, Maneuver | ArrayLike],
+    rate: float = 512.0,
+) -> tuple[str, ...]:
+    """Write the live page of any machine: as `write_live_page`, with what its model says of it.
+
+    Each parameter has a slider, each input that changes and each output a panel, in which the
+    limits are shaded.
+
+    Parameters
+    ----------
+    machine : Machine
+        What the sliders begin at. It is compiled, which needs the extra ``binaries``.
+    path : path
+        The file, which replaces an older one.
+    inputs : mapping of str to Maneuver, array_like or float
+        What it is simulated under, by name; at least one is a maneuver. In SI.
+    rate : float
+        Samples a second. [Hz]
+
+    Returns
+    -------
+    tuple of str
+        Sentences on what the page leaves out.
+
+    Raises
+    ------
+    InputError
+        If an input is missing or none, no input is a maneuver, or there is no compiler.
+    FileError
+        If the file cannot be written.
+    """
+    run = _run_under(machine, inputs, rate, {})
+    content = content_of(machine, run["step"])
+    outputs = content.exported.names
+    signals = [name for name in machine.model.outputs if name in outputs] or outputs
+    limits = list(machine.model.limit_meanings.items())
+    sentences = []
+    for what, names, most in (
+        ("signals", signals, MOST_PANELS),
+        ("limits", [name for name, _ in limits], len(COLOURS)),
+    ):
+        if len(names) > most:
+            sentences.append(f"Left out, beyond {most} {what}: {listed(names[most:])}.")
+    shown = [
+        {"bit": 1 << k, "name": f"limit-{k}", "words": meaning or name, "color": color}
+        for k, ((name, meaning), color) in enumerate(zip(limits, COLOURS, strict=False))
+    ]
+    page = PageMachine(
+        title=machine.title or machine.name,
+        code=webassembly(content),
+        values=content.values,
+        parameters=_machine_parameters(machine, content.exported),
+        design_variables=(),
+        outputs=outputs,
+        limits=shown,
+        panels=[_panel_of(machine, name, shown) for name in signals[:MOST_PANELS]],
+    )
+    write_text(live_page(page, [run], page.title), path)
+    return tuple(sentences)
+
+
 def live_page(
-    parameters: ParameterSet, runs: Sequence[dict[str, Any]], title: str, virtual: bool, name: str
+    page: PageMachine, runs: Sequence[Mapping[str, Any]], title: str, *, virtual: bool = False
 ) -> str:
-    """HTML of a live page with runs of `run_of`; see `write_live_page`."""
-    if parameters.equations:
-        raise InputError(
-            f"{parameters.name} has a user-defined equation, which the WebAssembly of the package "
-            "does not have: export its C source with swashplate.export.c."
-        )
-    exported = exported_drive()
-    limits = [(1 << k, Limit[name.upper()]) for k, (_, name, _) in enumerate(exported.limits)]
-    numbers = values_of(Drive(parameters), runs[0]["step"])
-    values = _parameters(parameters)
-    present_label = "as fitted" if any(value["main"] for value in values) else "as it is"
+    """HTML of a live page with runs such as those of `run_of`; see `write_live_page`."""
+    present_label = "as fitted" if any(each["main"] for each in page.parameters) else "as it is"
     content = {
-        "wasm": b64encode(licensed(packaged(WASM))).decode("ascii"),
-        "values": b64encode(numbers.astype("<f8").tobytes()).decode("ascii"),
-        "parameters": values,
-        "design_variables": _design_variables(values),
-        "outputs": [{"name": output, "number": k} for k, output in enumerate(exported.names)],
-        "limits": [[bit, _word(limit)] for bit, limit in limits],
+        "wasm": b64encode(licensed(page.code)).decode("ascii"),
+        "values": b64encode(page.values.astype("<f8").tobytes()).decode("ascii"),
+        "parameters": page.parameters,
+        "design_variables": page.design_variables,
+        "outputs": [{"name": output, "number": k} for k, output in enumerate(page.outputs)],
+        "limits": [[limit["bit"], limit["name"]] for limit in page.limits],
         "before": present_label,
+        "as_options": not page.file,
         "filter": {"low": LOW_PASS, "high": DIFFERENTIATOR},
-        "unmeasured": [_signal_panel(signal) for signal in UNMEASURED],
+        "unmeasured": page.panels,
         "runs": runs,
     }
     colours = "".join(
-        f".stack .{_word(limit)} {{ fill: {SHADES[limit].color}; }}\n" for _, limit in limits
+        f".stack .{limit['name']} {{ fill: {limit['color']}; }}\n" for limit in page.limits
     )
     return rendered(
         "fit_report/live.html",
@@ -164,13 +254,14 @@ def live_page(
         colours,
         data=script_json(content),
         title=title,
-        drive=parameters.title or parameters.name,
+        machine=page.title,
         virtual=virtual,
         measured=any(run["channels"] for run in runs),
         fitted=present_label == "as fitted",
         before=present_label,
-        limits=[(SHADES[limit].name, SHADES[limit].color) for limit in SHADES],
-        file=name,
+        limits=[(limit["words"], limit["color"]) for limit in page.limits],
+        variables=bool(page.design_variables),
+        file=page.file,
     )
 
 
@@ -180,39 +271,164 @@ def can_run(parameters: ParameterSet, experiment: Experiment) -> bool:
     return driven and not at_rate_of([experiment], parameters)[1]
 
 
+# --- machines -------------------------------------------------------------------------------------
+
+
+def drive_on_page(parameters: ParameterSet, step: float, file: str) -> PageMachine:
+    """A drive as a page runs it at a step [s]."""
+    drive = Drive(parameters)
+    content = content_of(drive, step)
+    values = _drive_parameters(parameters, content.exported)
+    limits = []
+    for k, exported in enumerate(content.exported.limits):
+        limit = Limit[exported.name.upper()]
+        shade = SHADES[limit]
+        limits.append(
+            {"bit": 1 << k, "name": _word(limit), "words": shade.name, "color": shade.color}
+        )
+    return PageMachine(
+        title=parameters.title or parameters.name,
+        code=webassembly(content),
+        values=content.values,
+        parameters=values,
+        design_variables=_design_variables(values),
+        outputs=content.exported.names,
+        limits=limits,
+        panels=[_signal_panel(signal) for signal in UNMEASURED],
+        file=file,
+    )
+
+
+def _run_under(
+    machine: Machine,
+    given: Mapping[str, Maneuver | ArrayLike],
+    rate: float,
+    labels: Mapping[str, str],
+) -> dict[str, Any]:
+    """A run without channels, whose inputs are in the order in which the machine's code has them.
+
+    An input's label is its name unless `labels` has another.
+    """
+    model = machine.model
+    inputs = {full_name(name, model.external): signal for name, signal in given.items()}
+    for name in inputs:
+        if name in model.input_parameters:
+            raise InputError(
+                f"{machine.name}: on a live page {name} is what the parameter "
+                f"{model.input_parameters[name]} says: set that."
+            )
+    maneuvers = [signal.name for signal in inputs.values() if isinstance(signal, Maneuver)]
+    if not maneuvers:
+        raise InputError(f"{machine.name}: one of the inputs must be a maneuver.")
+    records = inputs_of(machine, inputs, rate)
+    run_inputs = []
+    for name in model.external:
+        if name in records:
+            unit = _unit_of(model.input_definitions.get(name))
+            label = labels.get(name, unit.label(name))
+            moves = not is_real(inputs[name])
+            run_inputs.append(_input(records[name], label, unit.factor, shown=moves))
+    first = next(iter(records.values()))
+    return {
+        "start": first.start,
+        "step": first.step,
+        "inputs": run_inputs,
+        "name": maneuvers[0],
+        "role": "",
+        "channels": [],
+    }
+
+
+def _input(record: Record, label: str, factor: float = 1.0, *, shown: bool) -> dict[str, Any]:
+    """An input as the page takes it, rounded to four bytes: far finer than any converter."""
+    planes = record.values.astype("<f4").view(np.uint8).reshape(-1, 4).T.tobytes()
+    return {
+        "label": in_lines(label, 24),
+        "factor": factor,
+        "shown": shown,
+        "values": b64encode(compress(planes, 9)).decode("ascii"),
+    }
+
+
+def _unit_of(definition: Definition | None) -> DisplayUnit:
+    """The unit that a signal of a machine is shown in; none if the model states none."""
+    return display_unit(definition.unit) if definition and definition.unit else PLAIN
+
+
+def _panel_of(machine: Machine, name: str, limits: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
+    """The panel of a signal of a machine, in which all limits are shaded."""
+    displayed = _unit_of(machine.model.definitions.get(name))
+    return {
+        "signal": name,
+        "name": name,
+        "unit": displayed.name,
+        "factor": displayed.factor,
+        "label": in_lines(displayed.label(name), 24),
+        "residual": "",
+        "shaded": [limit["name"] for limit in limits],
+    }
+
+
 # --- parameters and design variables --------------------------------------------------------------
 
 
-def _parameters(parameters: ParameterSet) -> list[dict[str, Any]]:
+def _drive_parameters(parameters: ParameterSet, exported: Exported) -> list[dict[str, Any]]:
     """Every value of a set: its number in C, its words, and the ends of its slider."""
-    names = [name for _, _, name in exported_drive().named("parameters")]
+    names = [name for _, _, name in exported.named("parameters")]
     entries = []
     for parameter in parameters.values():
         definition = parameter.definition
-        # mm, bar and degrees; SI for the others
-        unit = DisplayUnit(unit_text(definition.unit), 1.0)
-        if definition.unit in ("m", "Pa", "rad"):
-            unit = display_unit(definition.unit, 1e5 if definition.unit == "Pa" else 0.0)
         sides = ("",) if len(definition.columns) == 1 else (", positive", ", negative")
         for column, side, value in zip(definition.columns, sides, parameter.values, strict=False):
-            if column not in names:
-                continue  # of a user-defined equation
-            entries.append(
-                {
-                    "number": names.index(column),
-                    "symbol": parameter.symbol,
-                    "column": column,
-                    "block": definition.block,
-                    "words": f"{definition.name}{side}",
-                    "si": definition.unit,
-                    "unit": unit.name,
-                    "factor": unit.factor,
-                    "value": value if isfinite(value) else 1e30,
-                    "range": slider(parameter, value),
-                    "main": parameter.status == "fitted",
-                }
-            )
+            entry = _slider(names.index(column), definition, value, slider(parameter, value))
+            entry |= {
+                "symbol": parameter.symbol,
+                "column": column,
+                "block": definition.block,
+                "words": f"{definition.name}{side}",
+                "main": parameter.status == "fitted",
+            }
+            entries.append(entry)
     return entries
+
+
+def _machine_parameters(machine: Machine, exported: Exported) -> list[dict[str, Any]]:
+    """Every parameter of a machine: its number in C, its words, and the ends of its slider."""
+    entries = []
+    for number, (part, path, _) in enumerate(exported.named("parameters")):
+        full = f"{machine.model.prefix(part)}{path}"
+        definition = machine.model.parameter_definitions[full]
+        value = float(machine.params[number])
+        ends = _ends(definition, value)
+        stated = definition.name not in (path, full)
+        entries.append(
+            {
+                **_slider(number, definition, value, ends),
+                "symbol": full,
+                "column": full,
+                "block": "",
+                "words": f"{full}: {definition.name}" if stated else full,
+                "main": False,
+            }
+        )
+    return entries
+
+
+def _slider(
+    number: int, definition: Definition, value: float, ends: tuple[float, float] | None
+) -> dict[str, Any]:
+    """A value of the machine's code; shown in mm, bar and degrees, else in SI."""
+    unit = DisplayUnit(unit_text(definition.unit), 1.0)
+    if definition.unit in ("m", "Pa", "rad"):
+        unit = display_unit(definition.unit, 1e5 if definition.unit == "Pa" else 0.0)
+    return {
+        "number": number,
+        "si": definition.unit,
+        "unit": unit.name,
+        "factor": unit.factor,
+        "value": value if isfinite(value) else NO_LIMIT,
+        "range": ends,
+    }
 
 
 def slider(parameter: Parameter, value: float) -> tuple[float, float] | None:
@@ -220,10 +436,14 @@ def slider(parameter: Parameter, value: float) -> tuple[float, float] | None:
     if parameter.own_bounds is not None and all(map(isfinite, parameter.own_bounds)):
         low, high = parameter.own_bounds
         return (low, high) if low < high else None
+    return _ends(parameter.definition, value)
+
+
+def _ends(definition: Definition, value: float) -> tuple[float, float] | None:
+    """Ends of the slider of a value without bounds of its own; None if no factor moves it."""
     if value == 0.0 or not isfinite(value):
         return None
     low, high = sorted((value / SPAN, value * SPAN))
-    definition = parameter.definition
     return max(low, definition.lower), min(high, definition.upper)
 
 
@@ -234,7 +454,7 @@ def _design_variables(values: Sequence[dict[str, Any]]) -> list[dict[str, Any]]:
         powers = DESIGN_VARIABLES[name]
         moves = []
         for value in values:
-            if value["value"] in (0.0, 1e30):
+            if value["value"] in (0.0, NO_LIMIT):
                 continue
             keys = {value["symbol"], value["column"]}  # the same without directions
             moves += [(value["number"], powers[key]) for key in keys if key in powers]
@@ -251,22 +471,15 @@ def _design_variables(values: Sequence[dict[str, Any]]) -> list[dict[str, Any]]:
 def run_of(experiment: Experiment) -> dict[str, Any]:
     """A run that a voltage drives, with its channels that a drive simulates."""
     channels = [_measured_channel(channel) for channel in _comparable(experiment.channels.values())]
+    record = voltage_record(experiment)
     return {
-        **_record(voltage_record(experiment)),
+        "start": record.start,
+        "step": record.step,
+        "inputs": [_input(record, COMMAND, shown=True)],
         "name": experiment.name,
         "role": experiment.role,
         "steady": experiment.begins == "steady",
         "channels": channels,
-    }
-
-
-def _record(record: Record) -> dict[str, Any]:
-    """A voltage as the page takes it, rounded to four bytes: far finer than any converter."""
-    planes = record.values.astype("<f4").view(np.uint8).reshape(-1, 4).T.tobytes()
-    return {
-        "start": record.start,
-        "step": record.step,
-        "voltage": b64encode(compress(planes, 9)).decode("ascii"),
     }
 
 
