@@ -22,6 +22,7 @@ from .estimation.solving import solve as solve
 from .estimation.solving import solve_from as solve_from
 from .estimation.stages import as_fit_setup as as_fit_setup
 from .estimation.stages import smooth as smooth
+from .estimation.stages import whole_drive as whole_drive
 from .estimation.unknowns import Prior as Prior
 from .estimation.unknowns import Unknown as Unknown
 from .estimation.unknowns import Unknowns as Unknowns

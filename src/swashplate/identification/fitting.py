@@ -39,6 +39,7 @@ from swashplate.identification.estimation.setup import FitSetup, FreeParameters,
 from swashplate.identification.estimation.solving import (
     Progress,
     Solution,
+    approached,
     sobol_starts,
     solve,
     solve_from,
@@ -460,10 +461,18 @@ def _solved(
         hopeless = None
         if search is None and isinstance(problem.model, EquationModel):
             hopeless = partial(_is_hopeless, problem)
-        solution = solver(problem, hopeless=hopeless)
+        start = None
+        if stage.has_spreads:
+            start = approached(problem, loss=solver.keywords["loss"])
+        solution = solver(problem, start, hopeless=hopeless)
         solutions = ()
         planned = 1 + OTHERS
-    if search is None and solution.loss == "linear" and _unexplained(problem, solution):
+    if (
+        search is None
+        and not stage.has_spreads
+        and solution.loss == "linear"
+        and _unexplained(problem, solution)
+    ):
         solutions, planned = _from_other_starts(stage, problem, solution, limits)
     if solutions:
         best = min(solutions, key=lambda solution: solution.cost)

@@ -9,7 +9,7 @@ from collections.abc import Collection, Mapping, Sequence
 from math import inf
 from typing import NamedTuple
 
-from swashplate.campaign import Channel, Experiment
+from swashplate.campaign import CURRENTS, Channel, Experiment
 from swashplate.identification.estimation.drive_model import DriveModel, true_value
 from swashplate.identification.estimation.model_setup import ModelSetup
 from swashplate.identification.estimation.stages import Parameters
@@ -435,17 +435,35 @@ class FitPart(NamedTuple):
 def stage_part(stage: StageFit) -> FitPart:
     """Estimates of a stage, how it ended, and what its estimates lack."""
     name, solution = stage.stage.name, stage.solution
+    # what priors and tests say together determines every number: the former are told instead
+    determined: Sequence[str] = identifiability_of(stage).sentences()
+    if stage.stage.has_spreads:
+        determined = together_lines(stage)
     return FitPart(
         f"Convergence of stage {name}, and validity of its intervals",
         [estimates_table(stage)],
         [f"{name}: {solution.message} after {solution.evaluations} evaluations."],
         [
-            *identifiability_of(stage).sentences(),
+            *determined,
             *uncertainty_of(stage).sentences(),
             *bounds_reached(stage),
         ],
         opened=True,
     )
+
+
+def together_lines(stage: StageFit) -> list[str]:
+    """That numbers which are near those of a named drive were estimated together, and why."""
+    lines = [
+        "Each number is taken to be near that of the drive that the fit began with, and all are "
+        "estimated together: a prediction uses what the tests show of them in common."
+    ]
+    if not any(run.of_kind(*CURRENTS) for run in stage.problem.experiments):
+        lines.append(
+            "No current was measured, so that the tests cannot tell the amplifier's numbers from "
+            "the solenoids': only what they do together is known."
+        )
+    return lines
 
 
 def fixed_part(stages: Sequence[StageFit], nominal: Parameters) -> FitPart:

@@ -45,6 +45,8 @@ SHAFT = ("shaft_speed", "shaft_position")
 """Signals of a drive that are one motion."""
 SAME = 1e-6
 """Costs that differ by less than this part are the same optimum."""
+MOST_NAMED = 12
+"""Values that a sentence lists; it counts more."""
 MOTIONS: Mapping[MotionClass, str] = {
     "large": "large motion",
     "small": "small motion, near the dead zone",
@@ -196,9 +198,15 @@ class Verdict(Result):
         total = self.quotable + len(self.undetermined)
         if not self.undetermined:
             return f"All {total} may be quoted with their intervals."
+        others = listed(self.undetermined)
+        if len(self.undetermined) > MOST_NAMED:
+            others = (
+                f"{len(self.undetermined)} others, which these tests show only together, as a "
+                "prediction uses them (estimates.csv has each)"
+            )
         return (
             f"{self.quotable} of {total} may be quoted with their intervals; not known to within "
-            f"±{percent(WIDE)}: {listed(self.undetermined)}."
+            f"±{percent(WIDE)}: {others}."
         )
 
     @property

@@ -17,7 +17,7 @@ from swashplate.errors import DomainError
 from swashplate.identification.estimation.model import EquationModel
 from swashplate.identification.estimation.problem import Loss
 from swashplate.identification.estimation.setup import FitSetup
-from swashplate.identification.estimation.solving import solve
+from swashplate.identification.estimation.solving import approached, solve
 from swashplate.identification.estimation.stages import Parameters, stage_problem
 
 WORDS: Mapping[Between, str] = {
@@ -105,13 +105,16 @@ def _costs(
 ) -> dict[Between, float] | None:
     """Cost of the first stage each way, straight lines first; None if a model is not tried."""
     costs = dict[Between, float]()
+    start = None
     sudden = any(run.input.jumps.size for run in runs)
     for between in WORDS if sudden else ("linear", "previous"):
         problem = stage_problem(setup.stages[0], nominal, joined(runs, between), threads=threads)
         if not isinstance(problem.model, EquationModel):
             return None
         try:
-            costs[between] = solve(problem, loss=loss, max_evaluations=ENOUGH).cost
+            if start is None and setup.stages[0].has_spreads:
+                start = approached(problem, loss=loss)
+            costs[between] = solve(problem, start, loss=loss, max_evaluations=ENOUGH).cost
         except DomainError:
             return None  # the fit itself says where the model does not hold
     return costs

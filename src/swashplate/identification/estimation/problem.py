@@ -360,11 +360,14 @@ def _pool(threads: int) -> ThreadPoolExecutor:
     return ThreadPoolExecutor(threads)
 
 
-def noise_scales(experiments: Sequence[Experiment], channels: Sequence[str]) -> dict[str, float]:
+def noise_scales(
+    experiments: Sequence[Experiment], channels: Sequence[str], *, least: float = 0.0
+) -> dict[str, float]:
     """What one unit of residual is, by channel.
 
-    A noise that is stated; or the rounding of an encoder; or 1 % of the range in all runs. A
-    channel that is in no experiment, or never changes, is refused.
+    A noise that is stated; or the rounding of an encoder; or 1 % of the range in all runs. At
+    `least` that share of the range. A channel that is in no experiment, or never changes, is
+    refused.
     """
     scales = {}
     for name in channels:
@@ -372,19 +375,20 @@ def noise_scales(experiments: Sequence[Experiment], channels: Sequence[str]) -> 
         if not having:
             channel_names = ", ".join(dict.fromkeys(c for run in experiments for c in run.channels))
             raise InputError(f"No experiment has a channel '{name}'; there are {channel_names}.")
+        # an ignored spike says nothing of the range
+        ranges = [
+            float(np.ptp(channel.values[channel.used])) for channel in having if channel.used.any()
+        ]
+        largest = max(ranges, default=0.0)
         stated = [channel.noise for channel in having if channel.noise is not None]
         if stated:
             scales[name] = float(np.sqrt(np.mean(np.square(stated))))
         elif step := having[0].resolution:
             # rounding leaves an error between -1/2 and 1/2 of a step
             scales[name] = step / np.sqrt(12.0)
-        else:  # an ignored spike says nothing of the range
-            ranges = [
-                float(np.ptp(channel.values[channel.used]))
-                for channel in having
-                if channel.used.any()
-            ]
-            scales[name] = 0.01 * max(ranges, default=0.0)
+        else:
+            scales[name] = 0.01 * largest
+        scales[name] = max(scales[name], least * largest)
         if scales[name] == 0.0:
             raise InputError(f"The channel '{name}' never changes: nothing can be fitted to it.")
     return scales

@@ -33,6 +33,8 @@ _SETUPS = files("swashplate.identification").joinpath("setups")
 Pair = tuple[Finite, Finite]
 StandardUncertainty = Positive | Annotated[str, Field(pattern=r"^\d+(\.\d+)? ?%$")]
 """A standard uncertainty: in SI units, or as "5 %" of the value."""
+WIDE = 8.0
+"""Factor to the bounds of a number that is known by its spread: far out for the widest in use."""
 COEFFICIENTS = ("Z19", "Z20", "Z21", "Z22")
 """Of the solenoids: what forces stand for."""
 
@@ -58,12 +60,36 @@ class Free(FileTable):
     log: Flag = Field(False, description="Estimate the logarithm: for positive values.")
     tied: Flag = Field(False, description="One value for both directions.")
     prior: Prior | None = Field(None, description="A normal distribution, of the logarithm if log.")
+    spread: Positive | None = Field(
+        None,
+        description="What is known beforehand instead of a prior: a standard deviation as a share "
+        "of the nominal value, of the logarithm of a positive one; bounds may be left out.",
+    )
 
     @model_validator(mode="after")
     def _bounded(self) -> Free:
-        if (self.relative is None) == (self.bounds is None):
+        if self.relative is not None and self.bounds is not None:
             raise ValueError("give either relative bounds or bounds")
+        if self.relative is None and self.bounds is None and self.spread is None:
+            raise ValueError("give either relative bounds or bounds, or a spread")
+        if self.spread is not None and self.prior is not None:
+            raise ValueError("give either a prior or a spread")
         return self
+
+    def about(self, nominal: float) -> Free:
+        """The same for a number of this nominal value, not 0: its spread as bounds and a prior."""
+        if self.spread is None:
+            return self
+        log = self.log or nominal > 0.0
+        size = abs(nominal)
+        bounds = self.bounds
+        if bounds is None and self.relative is None:
+            bounds = (nominal - WIDE * size, nominal + WIDE * size)
+            if log:
+                bounds = (nominal / WIDE, nominal * WIDE)
+        known = Prior(nominal, self.spread if log else self.spread * size)
+        changes = {"log": log, "prior": known, "bounds": bounds, "spread": None}
+        return self.model_copy(update=changes)
 
 
 class Forces(FileTable):
@@ -191,6 +217,11 @@ class Stage(FileTable):
         if self.start_pressure is not None and self.part == "card":
             raise ValueError("a card alone has no start_pressure")
         return self
+
+    @property
+    def has_spreads(self) -> bool:
+        """Whether each number is known to be near its nominal value: see `stages.whole_drive`."""
+        return self.forces is None and all(entry.spread for entry in self.free.values())
 
     def beyond(self, unknown: Unknown, side: int, definitions: Definitions) -> str:
         """What to do about an unknown of the machine at its lower (-1) or upper (1) bound.

@@ -52,6 +52,10 @@ _ENDINGS = {
     3: "the parameters no longer changed",
     4: "neither cost nor parameters changed any more",
 }
+APPROACH = (30.0, 10.0, 3.0)
+"""Factors on the unit of the residuals, one after another."""
+COARSE = 1e-4
+"""Tolerance of these searches."""
 TRIES = 200
 """Points that are tried for each start."""
 
@@ -365,6 +369,38 @@ def sobol_starts(problem: Problem, count: int, seed: int) -> Iterator[Array]:
             continue
         usable += 1
         yield vector
+
+
+def approached(problem: Problem, *, loss: Loss = "linear") -> Array:
+    """A start for a problem of which every number has a prior: near the optimum next to the priors.
+
+    The unit of the residuals is first 30 times what it is, then 10 and 3 times (`APPROACH`): as
+    long as curves are far apart the priors lead, so that no number is driven to the far side of a
+    limit or a dead zone to mend the first misfit. It is the continuation in the weight of the data
+    by which regularised inverse problems are solved.
+
+    Parameters
+    ----------
+    problem : Problem
+    loss : Loss
+        Robust loss on each residual.
+
+    Returns
+    -------
+    (K,) array
+        For `solve`.
+
+    Raises
+    ------
+    DomainError
+        If the model does not hold at the nominal values.
+    """
+    vector = problem.start
+    for factor in APPROACH:
+        scales = {name: factor * scale for name, scale in problem.scales.items()}
+        coarse = replace(problem, scales=scales)
+        vector = solve(coarse, vector, loss=loss, tolerance=COARSE).vector
+    return vector
 
 
 class _StartFile(BaseModel):

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from swashplate.campaign import Campaign, Experiment, applying, inside
 from swashplate.documents import validated
 from swashplate.drive import Drive
-from swashplate.errors import InputError, UnknownParameterError
+from swashplate.errors import InputError, ParameterError, UnknownParameterError
 from swashplate.executors import available_cores
 from swashplate.identification.estimation.drive_model import (
     CURRENTS,
@@ -38,6 +38,7 @@ from swashplate.identification.estimation.model_setup import ModelSetup
 from swashplate.identification.estimation.problem import Problem, noise_scales
 from swashplate.identification.estimation.setup import (
     FitSetup,
+    Free,
     FreeParameters,
     Stage,
     deviation,
@@ -63,6 +64,16 @@ Parameters = ParameterSet | ModelSetup
 Fitted = TypeVar("Fitted", bound=Parameters)
 FORCE = Definition("force of the solenoids", "N", plausible=(0.0, 1e4))
 """What stands for their coefficients."""
+UNKNOWN_MACHINE = "neutral"
+"""The packaged drive that stands for no machine: nothing is known of one by its numbers."""
+MODEL_ERROR = 0.01
+"""Error of any model of a machine, as a share of a channel's range: where numbers have priors, a
+channel that is read more finely counts no more than this, or the model's own error, small but the
+same over a whole run, would drive them away from what is known. [1]"""
+LIKE_NAMED = 0.3
+"""How near a machine's numbers are taken to be to those of the drive that is named for it, a
+standard deviation of their logarithms: what differs between machines of a kind is not known, so
+this is wide. [1]"""
 LARGEST_START_PRESSURE = 4e6
 """Bound of a free pressure at the start if the fit setup gives none. [Pa]"""
 
@@ -166,11 +177,16 @@ def setup_of(
     """The fit setup of an axis.
 
     By default the packaged one of the drive that the campaign names, or else of the given one; an
-    `InputError` if there is none. `free` as of `as_fit_setup`.
+    `InputError` if there is none. Without a measured current it is `whole_drive` of that drive,
+    since nothing then tells the amplifier's numbers from the pump's. `free` as of `as_fit_setup`.
     """
+    runs = campaign.select(axis=axis, role="fit")
     if free is not None:
-        runs = campaign.select(axis=axis, role="fit")
         return as_fit_setup(free, runs, drive.definitions)
+    kinds = {channel.kind for run in runs for channel in run.channels.values()}
+    by_voltage = all(run.input.kind == "voltage" for run in runs)
+    if by_voltage and kinds.isdisjoint(CURRENTS) and drive.name != UNKNOWN_MACHINE:
+        return whole_drive(drive)
     name = drive.name if campaign.axes[axis].drive is None else campaign.drive(axis).name
     if name not in setup_names():
         raise InputError(
@@ -179,6 +195,40 @@ def setup_of(
             "logs."
         )
     return load_setup(name)
+
+
+def whole_drive(parameters: ParameterSet, spread: float = LIKE_NAMED) -> FitSetup:
+    """A fit setup of every number that is not 0 or off, in one stage through the whole drive.
+
+    Each is known beforehand to within a share of its nominal value: what the tests determine
+    becomes narrower, and what they do not stays as wide as it was, in the intervals as in the
+    stated error of a prediction. So nothing need be fixed that is not known.
+
+    Parameters
+    ----------
+    parameters : ParameterSet
+        The drive that the machine is like.
+    spread : float
+        Standard deviation of a number, as a share of its nominal value. [1]
+
+    Returns
+    -------
+    FitSetup
+        Refinements, which somebody stated, stay fixed.
+    """
+    free = dict[str, Free]()
+    for symbol, parameter in parameters.items():
+        if parameter.definition.block == "refinements":
+            continue
+        moved = [
+            column
+            for column, number in parameter.numbers.items()
+            if number != 0.0 and np.isfinite(number)
+        ]
+        names = [symbol] if len(moved) == len(parameter.numbers) else moved
+        free |= {name: Free(spread=spread) for name in names}
+    title = f"every number of {parameters.name}, known to within {100.0 * spread:g} %"
+    return FitSetup(title=title, stages=(Stage(name="drive", part="chain", free=free),))
 
 
 def stage_problem(
@@ -225,7 +275,7 @@ def stage_problem(
         tuple(_weighted(run, stage) for run in runs),
         Unknowns(tuple(unknowns)),
         channels,
-        noise_scales(runs, channels),
+        noise_scales(runs, channels, least=MODEL_ERROR if stage.has_spreads else 0.0),
         uncertain=tuple(
             {
                 column: deviation(doubt, _nominal(parameters, column))
@@ -335,20 +385,29 @@ def _of_the_machine(stage: Stage, parameters: ParameterSet) -> list[Unknown]:
         least = -np.inf if definition.least is None else definition.least
         for group in [columns] if entry.tied else [(column,) for column in columns]:
             nominal = float(np.mean([_nominal(parameters, column) for column in group]))
+            if entry.spread is not None and nominal == 0.0:
+                raise ParameterError(
+                    f"{name} is nominally 0, and no spread is a share of that: give bounds "
+                    "and a prior."
+                )
+            about = entry.about(nominal)
+            bounds = about.bounds
+            if entry.spread is not None and entry.bounds is None and bounds is not None:
+                bounds = _possible(definition, bounds)
             unknown = bounded(
                 name if entry.tied else group[0],
                 nominal,
-                factors=entry.relative,
-                bounds=entry.bounds,
+                factors=about.relative,
+                bounds=bounds,
                 least=least,
                 sets=group,
                 unit=definition.unit,
-                log=entry.log,
-                prior=entry.prior,
+                log=about.log,
+                prior=about.prior,
             )
             check_plausible(f"a bound of {unknown.name}", definition, unknown.low, unknown.high)
-            if entry.prior is not None:
-                check_plausible(f"the prior mean of {unknown.name}", definition, entry.prior.mean)
+            if about.prior is not None:
+                check_plausible(f"the prior mean of {unknown.name}", definition, about.prior.mean)
             unknowns.append(unknown)
     if stage.forces is not None:
         for name, value in stage.forces.values(parameters).items():
@@ -363,6 +422,15 @@ def _of_the_machine(stage: Stage, parameters: ParameterSet) -> list[Unknown]:
             check_plausible(f"a bound of {name}", FORCE, force.low, force.high)
             unknowns.append(force)
     return unknowns
+
+
+def _possible(definition: Definition, bounds: tuple[float, float]) -> tuple[float, float]:
+    """Bounds within what a parameter may be, and what somebody can mean."""
+    low, high = max(bounds[0], definition.lower), min(bounds[1], definition.upper)
+    least, most = definition.plausible or (0.0, np.inf)
+    if low > 0.0:
+        low = max(low, least)
+    return max(low, -most), min(high, most)
 
 
 def _nominal(parameters: ParameterSet, column: str) -> float:

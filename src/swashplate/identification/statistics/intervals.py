@@ -19,7 +19,7 @@ from swashplate.identification.estimation.drive_model import (
     limits_unreached,
 )
 from swashplate.identification.estimation.problem import LinearisedFit, Problem, linearised_fit
-from swashplate.identification.estimation.unknowns import Unknowns
+from swashplate.identification.estimation.unknowns import Prior, Unknown, Unknowns
 from swashplate.identification.noise import (
     Covariance,
     NoiseColour,
@@ -39,7 +39,7 @@ from swashplate.identification.statistics.effects import (
 )
 from swashplate.identification.statistics.interval_ends import CheckedEnd, checked_ends
 from swashplate.results import Result, short
-from swashplate.tables import percent
+from swashplate.tables import listed, percent
 
 Array = NDArray[np.float64]
 Systematic = Mapping[str, Array]
@@ -539,6 +539,16 @@ def released(fit: LinearisedFit) -> LinearisedFit:
     return fit if fit.variables.free.all() else replace(fit, variables=fit.variables.released)
 
 
+MOST_PRIORS = 5
+"""Priors that are told one by one."""
+HALVED, UNTOLD = 0.25, 0.9
+"""Shares of a prior below which the tests have halved its width, and above which they say nothing
+of the number. [1]"""
+FAR = 3.0
+"""Deviations from its prior beyond which an estimate is named: by chance one of 40 in a tenth of
+fits."""
+
+
 def weighed(problem: Problem, vector: Array) -> Problem:
     """The problem with priors that count as much as the residuals are really worth.
 
@@ -561,9 +571,41 @@ def weighed(problem: Problem, vector: Array) -> Problem:
     return replace(problem, unknowns=problem.unknowns.with_worths(worths))
 
 
+class _PriorShare(NamedTuple):
+    """What a prior says of an unknown, beside what the data say."""
+
+    unknown: Unknown
+    prior: Prior
+    share: float
+    """Part of the information on the unknown that is the prior's. [1]"""
+    pull: float
+    """Distance of the estimate from the prior's mean, in its standard deviations."""
+
+    @property
+    def words(self) -> str:
+        """Its mean and standard deviation."""
+        spread = f"{self.prior.deviation:.4g}"
+        if self.unknown.log:
+            spread = f"{100.0 * self.prior.deviation:.3g} %"
+        return f"{self.prior.mean:.5g} ± {spread}"
+
+    @property
+    def sentence(self) -> str:
+        """All of it."""
+        return (
+            f"The prior of {self.unknown.name}, {self.words}, contributes "
+            f"{percent(self.share, 1.0)} of the information on it; the estimate lies "
+            f"{abs(self.pull):.2g} deviations {'above' if self.pull >= 0.0 else 'below'} its mean."
+        )
+
+
 def prior_sentences(unknowns: Unknowns, vector: Array, quoted: Covariance) -> tuple[str, ...]:
-    """What each prior of the machine adds, and how far from it the estimate lies."""
-    sentences = []
+    """What priors of the machine add, and which estimates lie far from theirs.
+
+    Of a few each has a sentence; of many those are named that the tests leave as they were, and
+    those from which the estimate lies more than `FAR` deviations.
+    """
+    priors = list[_PriorShare]()
     for unknown, number, error in zip(unknowns, vector, quoted.standard_errors, strict=True):
         prior = unknown.prior
         if prior is None or unknown.run is not None:
@@ -572,12 +614,24 @@ def prior_sentences(unknowns: Unknowns, vector: Array, quoted: Covariance) -> tu
         middle = log(prior.mean) if unknown.log else prior.mean
         pull = (float(number) * scale - middle) / prior.deviation
         share = min(float(error * scale / prior.deviation) ** 2, 1.0)
-        spread = f"{100.0 * prior.deviation:.3g} %" if unknown.log else f"{prior.deviation:.4g}"
-        sentences.append(
-            f"The prior of {unknown.name}, {prior.mean:.5g} ± {spread}, contributes "
-            f"{percent(share, 1.0)} of the information on it; the estimate lies "
-            f"{abs(pull):.2g} deviations {'above' if pull >= 0.0 else 'below'} its mean."
-        )
+        priors.append(_PriorShare(unknown, prior, share, pull))
+    if len(priors) <= MOST_PRIORS:
+        return tuple(each.sentence for each in priors)
+    narrowed = [each.unknown.name for each in priors if each.share < HALVED]
+    unchanged = [each.unknown.name for each in priors if each.share > UNTOLD]
+    sentences = [
+        f"Of {len(priors)} numbers with a prior the tests narrow {len(narrowed)} to less than half "
+        f"of it{f': {listed(narrowed)}' if narrowed else ''}."
+    ]
+    if unchanged:
+        sentences.append(f"They say nothing of {listed(unchanged)}: these stay as stated.")
+    sentences += [
+        f"{each.unknown.name} lies {abs(each.pull):.2g} deviations "
+        f"{'above' if each.pull >= 0.0 else 'below'} its prior, {each.words}: the machine differs "
+        "there from the drive that it is compared with, or the model does not suit it."
+        for each in priors
+        if abs(each.pull) > FAR
+    ]
     return tuple(sentences)
 
 
