@@ -7,7 +7,13 @@ import pytest
 from tests.identification.given import TIME, run_of, virtual
 
 from swashplate import Campaign, Drive, ParameterError, identify
-from swashplate.identification import FitSetup, drawn_drive, load_setup, whole_drive
+from swashplate.identification import (
+    FitSetup,
+    drawn_drive,
+    load_setup,
+    prior_information,
+    whole_drive,
+)
 from swashplate.identification.estimation.setup import setup_text
 from swashplate.identification.estimation.stages import setup_of, stage_problem
 from swashplate.maneuvers import parse
@@ -92,6 +98,16 @@ def test_the_finest_encoder_counts_no_more_than_the_model_is_worth() -> None:
     for entry, unit in ((step, 1e-6), ({"spread": 0.3}, 0.01 * np.ptp(np.sin(TIME)))):
         problem = stage_problem(free(Z10=entry).stages[0], HOIST, [fine])
         assert problem.scales["shaft_speed"] == pytest.approx(unit)
+
+
+def test_what_is_known_beforehand_counts_once_not_once_a_test() -> None:
+    known = prior_information(HOIST, whole_drive(HOIST))
+    told = np.linalg.norm(known.candidate(parse("step:2")).derivatives, axis=0)
+    beforehand = np.linalg.norm(known.present, axis=0)
+    names = list(known.variables.names)
+    assert told[names.index("Z15")] == 0.0
+    assert told[names.index("V_dz_plus")] > 0.0
+    assert (beforehand > 0.0).all()
 
 
 MANEUVERS = [

@@ -262,12 +262,12 @@ class PriorInformation(Result):
 
     def candidate(self, maneuver: Maneuver, sensors: Sequence[Sensor] = ()) -> CandidateTest:
         """A test with some sensors, by default those of the campaign; free zeros are spent."""
-        # what is known beforehand counts once, not once a test
-        free = {k: v.model_copy(update={"prior": None}) for k, v in self.stage.free.items()}
-        stage, rows = self.stage.model_copy(update={"free": free}), []
+        rows = []
         for sensor in sensors or self.sensors:
-            imagined = _imagined(maneuver, sensor)
-            rows.append(machine_rows(stage_problem(stage, self.parameters, [imagined])))
+            problem = stage_problem(self.stage, self.parameters, [_imagined(maneuver, sensor)])
+            # what is known beforehand counts once, not once a test
+            data_alone = replace(problem, unknowns=problem.unknowns.with_worths(None))
+            rows.append(machine_rows(data_alone))
         return CandidateTest(maneuver.name, triangular_factor(np.vstack(rows)), maneuver.length)
 
 
