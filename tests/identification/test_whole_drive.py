@@ -10,6 +10,7 @@ from swashplate import Campaign, Drive, ParameterError, identify
 from swashplate.identification import (
     FitSetup,
     drawn_drive,
+    fit,
     load_setup,
     prior_information,
     whole_drive,
@@ -170,3 +171,16 @@ def test_a_hoist_is_predicted_and_its_numbers_lie_in_their_intervals(
     said = " ".join(result.fit.sentences)
     assert "cannot tell the amplifier's numbers from the solenoids'" in said
     assert "the tests narrow" in said
+
+
+@pytest.mark.slow
+def test_a_machine_that_is_not_like_the_named_drive_is_said_to_be_none(tmp_path) -> None:
+    thrice = Drive.preset("hoist").scale(Z10=3.0)
+    tests = virtual(
+        tmp_path, "hoist", MANEUVERS[:4], truth=thrice, seed=5, channels=("encoder_counts",)
+    )
+    said = " ".join(fit(Drive.preset("hoist"), tests, whole_drive(HOIST)).doubts)
+    assert re.search(
+        r"not like hoist, from whose numbers differ .*Z10 3\.\d deviations above", said
+    )
+    assert "swashplate guess" in said

@@ -83,6 +83,9 @@ TRIAL = 12
 """Evaluations of each other start if the first search was given up."""
 WINDOW = 1.0
 """Time over which the mean speed of a position is taken. [s]"""
+FAR = 3.0
+"""Deviations beyond which a number is not like that of the named drive: by chance one of 40 is in a
+tenth of fits."""
 UNEXPLAINED = 5.0
 """Residuals over their known measurement error from which another optimum is looked for."""
 SPREAD = 0.05
@@ -343,7 +346,24 @@ def fit(
         runs, between = settle(runs, smooth(nominal), setup, loss=loss, threads=threads)
         doubts += between
         stages = staged(setup, nominal, runs, solved, threads=threads)
+    doubts += tuple(each for stage in stages for each in _unlike(stage, nominal.name))
     return Fit(setup, nominal, tuple(runs), stages, doubts)
+
+
+def _unlike(stage: StageFit, drive: str) -> Iterator[str]:
+    """A sentence if the tests drive numbers far from those of the drive that the fit began with."""
+    if not stage.stage.has_spreads:
+        return
+    far = [
+        f"{unknown.name} {abs(pull):.2g} deviations {'above' if pull > 0.0 else 'below'}"
+        for unknown, number in zip(stage.problem.unknowns, stage.solution.vector, strict=True)
+        if unknown.run is None and abs(pull := unknown.pull(float(number))) > FAR
+    ]
+    if far:
+        yield (
+            f"The machine is not like {drive}, from whose numbers differ {listed(far)}. Begin from "
+            "a drive that it is like, or let 'swashplate guess' read one off the logs."
+        )
 
 
 class _Stated(NamedTuple):

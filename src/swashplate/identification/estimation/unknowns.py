@@ -6,7 +6,7 @@ from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from math import exp, inf, isfinite
+from math import exp, inf, isfinite, log
 from typing import Annotated, Any, Literal
 
 import numpy as np
@@ -147,6 +147,14 @@ class Unknown:
         """The value for a solver's number, kept within the bounds against rounding."""
         value = exp(number) if self.log else number * self.scale
         return min(max(value, self.low), self.high)
+
+    def pull(self, number: float) -> float:
+        """Distance of a solver's number from the prior's mean, in its deviations; 0 without one."""
+        if self.prior is None:
+            return 0.0
+        size = number if self.log else number * self.scale
+        middle = log(self.prior.mean) if self.log else self.prior.mean
+        return (size - middle) / self.prior.deviation
 
 
 def zero_name(channel: str) -> str:

@@ -544,9 +544,6 @@ MOST_PRIORS = 5
 HALVED, UNTOLD = 0.25, 0.9
 """Shares of a prior below which the tests have halved its width, and above which they say nothing
 of the number. [1]"""
-FAR = 3.0
-"""Deviations from its prior beyond which an estimate is named: by chance one of 40 in a tenth of
-fits."""
 
 
 def weighed(problem: Problem, vector: Array) -> Problem:
@@ -602,8 +599,8 @@ class _PriorShare(NamedTuple):
 def prior_sentences(unknowns: Unknowns, vector: Array, quoted: Covariance) -> tuple[str, ...]:
     """What priors of the machine add, and which estimates lie far from theirs.
 
-    Of a few each has a sentence; of many those are named that the tests leave as they were, and
-    those from which the estimate lies more than `FAR` deviations.
+    Of a few each has a sentence; of many those are named that the tests narrow, and those that they
+    leave as they were.
     """
     priors = list[_PriorShare]()
     for unknown, number, error in zip(unknowns, vector, quoted.standard_errors, strict=True):
@@ -611,10 +608,8 @@ def prior_sentences(unknowns: Unknowns, vector: Array, quoted: Covariance) -> tu
         if prior is None or unknown.run is not None:
             continue
         scale = 1.0 if unknown.log else unknown.scale
-        middle = log(prior.mean) if unknown.log else prior.mean
-        pull = (float(number) * scale - middle) / prior.deviation
         share = min(float(error * scale / prior.deviation) ** 2, 1.0)
-        priors.append(_PriorShare(unknown, prior, share, pull))
+        priors.append(_PriorShare(unknown, prior, share, unknown.pull(float(number))))
     if len(priors) <= MOST_PRIORS:
         return tuple(each.sentence for each in priors)
     narrowed = [each.unknown.name for each in priors if each.share < HALVED]
@@ -625,13 +620,6 @@ def prior_sentences(unknowns: Unknowns, vector: Array, quoted: Covariance) -> tu
     ]
     if unchanged:
         sentences.append(f"They say nothing of {listed(unchanged)}: these stay as stated.")
-    sentences += [
-        f"{each.unknown.name} lies {abs(each.pull):.2g} deviations "
-        f"{'above' if each.pull >= 0.0 else 'below'} its prior, {each.words}: the machine differs "
-        "there from the drive that it is compared with, or the model does not suit it."
-        for each in priors
-        if abs(each.pull) > FAR
-    ]
     return tuple(sentences)
 
 
