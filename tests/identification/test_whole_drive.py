@@ -1,6 +1,7 @@
 """Without a current every number of the named drive is estimated at once, near what it was."""
 
 import re
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -15,8 +16,9 @@ from swashplate.identification import (
     prior_information,
     whole_drive,
 )
+from swashplate.identification.estimation.between_samples import joined, settle
 from swashplate.identification.estimation.setup import setup_text
-from swashplate.identification.estimation.stages import setup_of, stage_problem
+from swashplate.identification.estimation.stages import setup_of, smooth, stage_problem
 from swashplate.maneuvers import parse
 from swashplate.parameters import DEFINITIONS
 
@@ -184,3 +186,27 @@ def test_a_machine_that_is_not_like_the_named_drive_is_said_to_be_none(tmp_path)
         r"not like hoist, from whose numbers differ .*Z10 3\.\d deviations above", said
     )
     assert "swashplate guess" in said
+
+
+@pytest.mark.slow
+def test_a_command_that_jumps_between_slow_samples_has_instants_one_way_and_none_another() -> None:
+    command = parse("step:6,length=7").sample(50.0)
+    time = np.arange(command.size) / 50.0
+    run = (
+        Drive.preset("hoist")
+        .at_every_rate()
+        .simulate(command, 8192.0, time=time, interpolation="previous")
+    )
+    speed = np.interp(time, run.time, run.shaft_speed)
+    logged = run_of("a", command, {"shaft_speed": speed}, time=time, noise=0.01)
+    logged = replace(logged, input=replace(logged.input, settled=False))
+    ways = ("linear", "previous", "jumps")
+    counts = {
+        len(stage_problem(whole_drive(HOIST).stages[0], HOIST, joined([logged], way)).unknowns)
+        for way in ways
+    }
+    assert len(counts) > 1
+    ((settled,), said) = settle([logged], smooth(HOIST), whole_drive(HOIST))
+    assert settled.input.interpolation in ways
+    assert settled.input.settled
+    assert said

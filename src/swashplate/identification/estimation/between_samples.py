@@ -105,15 +105,17 @@ def _costs(
 ) -> dict[Between, float] | None:
     """Cost of the first stage each way, straight lines first; None if a model is not tried."""
     costs = dict[Between, float]()
-    start = None
+    near = dict[str, float]()
     sudden = any(run.input.jumps.size for run in runs)
     for between in WORDS if sudden else ("linear", "previous"):
         problem = stage_problem(setup.stages[0], nominal, joined(runs, between), threads=threads)
         if not isinstance(problem.model, EquationModel):
             return None
         try:
-            if start is None and setup.stages[0].has_spreads:
-                start = approached(problem, loss=loss)
+            if setup.stages[0].has_spreads and not near:
+                near = problem.unknowns.values(approached(problem, loss=loss))
+            # one way has instants of jumps among its unknowns, another has none
+            start = problem.unknowns.vector_of(near)
             costs[between] = solve(problem, start, loss=loss, max_evaluations=ENOUGH).cost
         except DomainError:
             return None  # the fit itself says where the model does not hold
