@@ -28,6 +28,7 @@ from swashplate.identification.estimation.problem import (
     Problem,
     factor_of,
     linearised_fit,
+    noise_scales,
 )
 from swashplate.identification.estimation.setup import FitSetup, Stage
 from swashplate.identification.estimation.stages import stage_problem
@@ -266,7 +267,11 @@ class PriorInformation(Result):
         for sensor in sensors or self.sensors:
             problem = stage_problem(self.stage, self.parameters, [_imagined(maneuver, sensor)])
             # what is known beforehand counts once, not once a test
-            data_alone = replace(problem, unknowns=problem.unknowns.with_worths(None))
+            data_alone = replace(
+                problem,
+                unknowns=problem.unknowns.with_worths(None),
+                scales=noise_scales(problem.experiments, problem.channels),
+            )
             rows.append(machine_rows(data_alone))
         return CandidateTest(maneuver.name, triangular_factor(np.vstack(rows)), maneuver.length)
 
@@ -297,13 +302,14 @@ def prior_information(
         return _without_tests(parameters, stage, sensors or default_sensors(Drive(parameters)))
     problem = stage_problem(stage, parameters, experiments)
     fit = linearised_fit(problem, problem.start) if fitted else None
+    noises = noise_scales(problem.experiments, problem.channels)
     scales = {}
     by_kind = dict[str, Sensor]()
     for name in problem.channels:
         channels = [run[name] for run in problem.experiments if name in run.channels]
         intervals = np.concatenate([np.diff(channel.time) for channel in channels])
         interval = float(np.median(intervals))
-        sensor = Sensor(channels[0].kind, problem.scales[name], origin="as in the campaign")
+        sensor = Sensor(channels[0].kind, noises[name], origin="as in the campaign")
         if fit is not None:
             sensor = sensor_of_residuals(fit, channels, sensor, interval)
         # one sample in each `memory` is independent: the others are worth nothing
