@@ -160,14 +160,6 @@ def findings(program, folder):
     return [line[2:] for line in output.splitlines() if line.startswith("! ")]
 
 
-def guess(program, folder):
-    """Read a start off the logs, which a fit without a current asks for; options of `fit`."""
-    code, output, _, _ = program.run("guess", "campaign.toml", folder=folder)
-    if code:
-        raise CampaignError(output)
-    return "--from", "start.toml", "--setup", "setup.toml"
-
-
 def campaign(program, fault, axis, rate, seed, folder):
     """Record of a campaign with a fault or fewer instruments: what a user gets of it."""
     change = FAULTS.get(fault) or FEWER[fault]
@@ -177,9 +169,7 @@ def campaign(program, fault, axis, rate, seed, folder):
     record = {"unseen": unseen(change, sound), "cpu_init": draft(program, truth, folder)}
     record["check"] = findings(program, folder)
     try:
-        record["guessed"] = equipment.ammeter is None
-        words = guess(program, folder) if record["guessed"] else ()
-        record |= fit(program, truth, folder, *words)
+        record |= fit(program, truth, folder)
     except CampaignError as error:
         said = " ".join(str(error).split())
         refused = {"usable": False, "exit": error.code, "headline": said, "unsound": [said]}
@@ -422,8 +412,7 @@ def print_fewer(records):
     for axis, rate, fewer in sorted(groups, key=lambda key: (key[0], -key[1], order.index(key[2]))):
         some = groups[axis, rate, fewer]
         done = [record for record in some if "new" in record]
-        # values beside a guessed amplifier are in its units
-        intervals = with_interval([record for record in done if not record["guessed"]])
+        intervals = with_interval(done)
         errors = [max(record["new"].values()) for record in done]
         missed = Counter(row["name"] for row in intervals if not holds(row))
         often = [name for name, count in missed.items() if 2 * count > len(done)]
