@@ -690,6 +690,8 @@ def test_a_page_runs_a_machine_of_its_user_s(tmp_path: Path, browsed, monkeypatc
     inputs = {"inflow": inflow, "leak": 0.5}
     run = simulate(TANK, inputs, 100.0)
     np.testing.assert_allclose(made["first"], run["level"], rtol=0.0, atol=1e-14)
+    content = json.loads(re.search(r'id="live">(.*?)</script>', page.read_text("utf-8"))[1])
+    assert content["runs"][0]["name"] == "inflow"  # a maneuver's own name is in volts
     assert made["limits"]["limit-0"] == run.active("low").astype(int).tolist()
     assert sum(made["limits"]["limit-1"]) > 10
     name, value = re.fullmatch(r"--set (\w+)=(\S+)", made["toml"]).groups()

@@ -33,7 +33,7 @@ _SETUPS = files("swashplate.identification").joinpath("setups")
 Pair = tuple[Finite, Finite]
 StandardUncertainty = Positive | Annotated[str, Field(pattern=r"^\d+(\.\d+)? ?%$")]
 """A standard uncertainty: in SI units, or as "5 %" of the value."""
-WIDE = 8.0
+OUTERMOST = 8.0
 """Factor to the bounds of a number that is known by its spread: far out for the widest in use."""
 COEFFICIENTS = ("Z19", "Z20", "Z21", "Z22")
 """Of the solenoids: what forces stand for."""
@@ -84,11 +84,11 @@ class Free(FileTable):
         size = abs(nominal)
         bounds = self.bounds
         if bounds is None and self.relative is None:
-            bounds = (nominal - WIDE * size, nominal + WIDE * size)
+            bounds = (nominal - OUTERMOST * size, nominal + OUTERMOST * size)
             if log:
-                bounds = (nominal / WIDE, nominal * WIDE)
-        known = Prior(nominal, self.spread if log else self.spread * size)
-        changes = {"log": log, "prior": known, "bounds": bounds, "spread": None}
+                bounds = (nominal / OUTERMOST, nominal * OUTERMOST)
+        prior = Prior(nominal, self.spread if log else self.spread * size)
+        changes = {"log": log, "prior": prior, "bounds": bounds, "spread": None}
         return self.model_copy(update=changes)
 
 

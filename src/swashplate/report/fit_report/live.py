@@ -49,7 +49,8 @@ SHOWN = ("orifice", "pump", "supply_pressure", "rate_limits", "dead_zone", "spoo
 """Design variables that have a slider of their own; each parameter has one too."""
 BEFORE_CURRENT = Limit.DEAD_ZONE | Limit.CURRENT_RATE
 """Limits that are shaded in a panel of a current; the others are shaded in those of the pump."""
-COLOURS = (*(shade.color for shade in SHADES.values()), "#d9d2f0", "#d8e4a8")
+COLOURS = [shade.color for shade in SHADES.values()]
+COLOURS += ["#d9d2f0", "#d8e4a8"]
 """Of the limits of a machine; its code has a bit for no more."""
 MOST_PANELS = 8
 """Signals of a machine that are shown."""
@@ -317,7 +318,7 @@ def _run_under(
                 f"{machine.name}: on a live page {name} is what the parameter "
                 f"{model.input_parameters[name]} says: set that."
             )
-    maneuvers = [signal.name for signal in inputs.values() if isinstance(signal, Maneuver)]
+    maneuvers = {name: signal for name, signal in inputs.items() if isinstance(signal, Maneuver)}
     if not maneuvers:
         raise InputError(f"{machine.name}: one of the inputs must be a maneuver.")
     records = inputs_of(machine, inputs, rate)
@@ -328,12 +329,16 @@ def _run_under(
             label = labels.get(name, unit.label(name))
             moves = not is_real(inputs[name])
             run_inputs.append(_input(records[name], label, unit.factor, shown=moves))
+    driven, maneuver = next(iter(maneuvers.items()))
+    definition = model.input_definitions.get(driven)
+    in_volts = definition is None or definition.unit in ("", "V")
+    command = maneuver.name if in_volts else driven  # its own name is in volts
     first = next(iter(records.values()))
     return {
         "start": first.start,
         "step": first.step,
         "inputs": run_inputs,
-        "name": maneuvers[0],
+        "name": command,
         "role": "",
         "channels": [],
     }
