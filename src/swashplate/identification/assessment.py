@@ -46,6 +46,7 @@ from swashplate.identification.statistics.intervals import (
     intervals_of,
     unseen_limits,
 )
+from swashplate.identification.statistics.posterior import Posterior, posterior_of
 from swashplate.identification.statistics.profiles import Profile
 from swashplate.identification.validation import RunQuality, predict
 from swashplate.locks import locked
@@ -140,7 +141,17 @@ class Identification(Estimated):
     @cached_property
     def predicted(self) -> tuple[RunQuality, ...]:
         """Runs of the axis that were held out, predicted."""
-        return predict(self.fit.parameters, self.held_out)
+        return predict(self.fit.parameters, self.held_out, self.posterior)
+
+    @cached_property
+    def posterior(self) -> Posterior:
+        """What the fit leaves open of the machine's numbers; nothing if that is not known."""
+        if self.stored is not None and self.stored.posterior is not None:
+            return self.stored.posterior
+        try:
+            return posterior_of(self.fit.stages)
+        except InputError:  # no more samples than unknowns
+            return Posterior((), np.zeros((0, 0)))
 
     @cached_property
     def verdict(self) -> Verdict:
@@ -150,7 +161,11 @@ class Identification(Estimated):
         planned = [stage.name for stage in self.fit.setup.stages]
         with working("Judging the fit"):
             return assess_fit(
-                self.fit.stages, self.predicted, planned=planned, required=self.required
+                self.fit.stages,
+                self.predicted,
+                planned=planned,
+                required=self.required,
+                posterior=self.posterior,
             )
 
     def tables(self) -> list[Table]:
@@ -323,6 +338,7 @@ class Identification(Estimated):
                 numbers=dict(self.fit.parameters.numbers),
                 required=self.required,
                 held_out={run.name: fingerprint(run) for run in self.held_out},
+                posterior=self.posterior,
             ),
         )
 
@@ -474,6 +490,8 @@ class StoredVerdict(FileTable):
     """See `Identification`."""
     held_out: dict[str, str] = Field({})
     """Name to fingerprint of each run that was held out."""
+    posterior: Posterior | None = None
+    """What the fit leaves open of its numbers; None in a file that does not have it."""
 
     def holds_for(self, result: Identification) -> bool:
         """Whether it is the verdict on these numbers, requirement and runs held out."""

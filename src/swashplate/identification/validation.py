@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, NamedTuple, cast
 
 import numpy as np
@@ -33,6 +33,7 @@ from swashplate.parameters import HasParameters, ParameterSet, set_of
 from swashplate.results import Result, figures
 
 if TYPE_CHECKING:
+    from swashplate.identification.statistics.posterior import Posterior
     from swashplate.results import Figure
 Array = NDArray[np.float64]
 
@@ -217,6 +218,10 @@ class RunQuality(Result):
     noise: float = 0.0
     """Standard deviation of a position's noise in a speed made from it.
     [unit of the channel]"""
+    left_open: Array | None = field(default=None, repr=False)
+    """(m, s) changes of what is simulated for a standard deviation of each independent error that
+    the numbers of the machine may have, as of `Posterior.errors_of`; None if nothing is known of
+    these. [unit of the channel]"""
 
     @property
     def residual(self) -> Array:
@@ -259,7 +264,9 @@ def compared(experiment: Experiment, name: str, simulated: Array) -> RunQuality:
 
 
 def predict(
-    model: Parameters | HasParameters, experiments: Sequence[Experiment]
+    model: Parameters | HasParameters,
+    experiments: Sequence[Experiment],
+    posterior: Posterior | None = None,
 ) -> tuple[RunQuality, ...]:
     """Predict runs from their input alone and compare every channel that the drive has.
 
@@ -270,6 +277,8 @@ def predict(
     experiments : sequence of Experiment
         Runs that it was not fitted to. A voltage goes through the whole chain, a current through
         pump and motor.
+    posterior : Posterior, optional
+        What the fit of a drive leaves open of its numbers, and so of what is predicted.
 
     Returns
     -------
@@ -304,7 +313,8 @@ def predict(
     for run in experiments:
         if not any(channel.kind in SIGNALS for channel in run.channels.values()):
             raise InputError(f"{run.name} has no channel that a drive has.")
-        drive = DriveModel(parameters, "pump" if run.input.kind == "current" else "chain")
+        drive = DriveModel(parameters)
+        left_open = {} if posterior is None else posterior.errors_of(drive, {}, run)
         for name, simulated in drive.simulate({}, at_instants(parameters, run)).items():
             channel = run[name]
             if not channel.used.any():
@@ -312,7 +322,8 @@ def predict(
             zero = 0.0
             if channel.is_position:
                 zero = np.average(channel.values - simulated, weights=channel.weight)
-            qualities.append(compared(run, name, simulated + zero))
+            quality = compared(run, name, simulated + zero)
+            qualities.append(replace(quality, left_open=left_open.get(name)))
     return tuple(qualities)
 
 

@@ -12,6 +12,7 @@ from collections import defaultdict
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from math import ceil
+from types import MappingProxyType
 from typing import Literal, NamedTuple, get_args
 
 import numpy as np
@@ -24,6 +25,7 @@ from scipy.special import stdtrit
 from swashplate.campaign import UNNAMED, Experiment
 from swashplate.identification.estimation.problem import LinearisedFit, LinearisedRun
 from swashplate.identification.stage_fit import StageFit
+from swashplate.identification.statistics.posterior import mean_square_bound
 from swashplate.identification.validation import RunQuality
 from swashplate.results import Result
 
@@ -167,6 +169,9 @@ class ChannelErrors(NamedTuple):
     command: Array
     """(n,)"""
     is_position: bool
+    left_open: Array | None = None
+    """(n, s) errors that the numbers of the machine leave open, see `Posterior.errors_of`; None if
+    nothing is known of these. [unit]"""
 
 
 def channel_errors(
@@ -211,7 +216,15 @@ def channel_errors(
         rate=TIME * np.gradient(signal, step),
         command=experiment.input.at(grid),
         is_position=channel.is_position,
+        left_open=_on_grid(grid, channel.time, quality.left_open),
     )
+
+
+def _on_grid(grid: Array, time: Array, columns: Array | None) -> Array | None:
+    """(n, s) samples (m, s) at other instants."""
+    if columns is None:
+        return None
+    return np.column_stack([np.interp(grid, time, column) for column in columns.T])
 
 
 @dataclass(frozen=True)
@@ -279,6 +292,14 @@ def windowed(values: Array, weights: Array) -> Array:
     return sums
 
 
+def left_open_over(record: ChannelErrors, window: float) -> Array:
+    """(n, s) errors that are left open over a window about each sample; s is 0 if none is."""
+    if record.left_open is None or not record.left_open.size:
+        return np.zeros((record.signal.size, 0))
+    weights = window_weights(record, window)
+    return np.column_stack([windowed(column, weights) for column in record.left_open.T])
+
+
 def classes_of(
     record: ChannelErrors, reach: float, largest: float
 ) -> dict[MotionClass, NDArray[np.bool_]]:
@@ -312,6 +333,8 @@ class WindowCell(NamedTuple):
     """Variance of the noise in each. [1]"""
     terms: Array
     """(m, 3) of the variance function: 1, the signal's square, that of its rate. [1]"""
+    left_open: Array
+    """(m, s) errors that the numbers of the machine leave open, over the range. [1]"""
 
 
 def cells_of(records: Iterable[ChannelErrors]) -> tuple[list[WindowCell], float]:
@@ -351,6 +374,7 @@ def cells_of(records: Iterable[ChannelErrors]) -> tuple[list[WindowCell], float]
                     squares=squares,
                     noise=noise / reach**2,
                     terms=terms,
+                    left_open=left_open_over(record, WINDOWS[motion])[rows] / reach,
                 )
             )
     return cells, max(reach, 0.0)
@@ -375,6 +399,17 @@ class ClassError(NamedTuple):
     """Fitted runs with such a motion."""
     held_out: int
     """Runs with such a motion that were held out."""
+    left_open: float = 0.0
+    """Part of the error that the numbers of the machine leave open in reference motions. [1]"""
+
+
+class FasterError(NamedTuple):
+    """What is left open of a sine that is faster than any test."""
+
+    frequency: float
+    """[Hz]"""
+    error: float
+    """Root mean square that it stays below with nine of ten, over the range. [1]"""
 
 
 @dataclass(frozen=True)
@@ -394,6 +429,8 @@ class PredictionError(Result):
 
     of_position: bool = False
     """Whether the channel is a position, of which the speed is judged."""
+    faster: FasterError | None = None
+    """None if the tests are as fast, or nothing is left open."""
 
     @property
     def worst(self) -> ClassError:
@@ -418,7 +455,10 @@ class PredictionError(Result):
 
 
 def prediction_errors(
-    stages: Sequence[StageFit], predicted: Sequence[RunQuality], unexplained: Collection[str] = ()
+    stages: Sequence[StageFit],
+    predicted: Sequence[RunQuality],
+    unexplained: Collection[str] = (),
+    motions: Mapping[str, Sequence[LeftOpen]] = MappingProxyType({}),
 ) -> tuple[PredictionError, ...]:
     """How far predictions of each channel may be off; channels that never move are left out.
 
@@ -431,6 +471,8 @@ def prediction_errors(
     unexplained : collection of str
         Those of them that noise and discrepancy do not explain: the variance function is that of
         all others, as long as there are others.
+    motions : mapping
+        Of each channel what the numbers of the machine leave open in reference motions.
 
     Notes
     -----
@@ -438,7 +480,9 @@ def prediction_errors(
     non-negative least squares, weighted by the inverse of the squared mean. The logarithms of
     observed over fitted squares of the maneuvers have a mean m and a deviation d; a new one stays
     below exp(m + t d √(1 + 1/k)), the bound of a prediction. What the instrument's gain may be off
-    is an error of the motion that no run of it shows. Of a class the error is at least the one that
+    is an error of the motion that no run of it shows. The square of what the posterior leaves open
+    of reference motions of a class is added: tests say nothing of what they do not contain. Of a
+    class the error is at least the one that
     n runs that were held out show, unexplained ones too: the ⌈0.9 (n + 1)⌉-th smallest, which a new
     one exceeds with a probability of a tenth at most, whatever the distribution (Vovk, Gammerman
     and Shafer 2005, section 2.2), and of fewer than ten the largest.
@@ -459,31 +503,83 @@ def prediction_errors(
         coefficients = bound_of_variance(explained or cells)
         coefficients[1] += measured.instrument.gain**2 / 3.0
         constant, by_signal, by_rate = coefficients.tolist()
+        of_channel = motions.get(name, ())
+        largest = max((cell_command(part.record) for part in of_channel), default=0.0)
         errors.append(
             PredictionError(
                 channel=name,
                 unit=f"{measured.unit}/s" if measured.is_position else measured.unit,
                 reach=reach,
                 coefficients=(constant, by_signal, by_rate),
-                classes=tuple(_class_errors(cells, coefficients)),
+                classes=tuple(
+                    _class_errors(cells, coefficients, _open_by_class(of_channel, reach, largest))
+                ),
                 of_position=measured.is_position,
+                faster=_faster(of_channel, reach),
             )
         )
     return tuple(errors)
 
 
-def _class_errors(cells: Sequence[WindowCell], coefficients: Array) -> Iterator[ClassError]:
-    """The stated error of each class of motion that some window has."""
+class LeftOpen(NamedTuple):
+    """One channel of a motion, and what the numbers of the machine leave open of it."""
+
+    record: ChannelErrors
+    faster: float = 0.0
+    """Frequency of a sine that is faster than any test; 0 of any other motion. [Hz]"""
+
+
+def cell_command(record: ChannelErrors) -> float:
+    """Largest command of a record."""
+    return float(np.abs(record.command).max())
+
+
+def _open_by_class(
+    motions: Sequence[LeftOpen], reach: float, largest: float
+) -> dict[MotionClass, float]:
+    """Mean square that is left open of the motions of each class, none faster than the tests."""
+    windows = defaultdict[MotionClass, list[Array]](list)
+    for part in motions:
+        if part.faster:
+            continue
+        for motion, inside in classes_of(part.record, reach, largest).items():
+            rows = left_open_over(part.record, WINDOWS[motion])[inside] / reach
+            windows[motion].append(rows[np.isfinite(rows).all(axis=1)])
+    return {
+        motion: mean_square_bound(np.vstack(parts), BOUND_LEVEL)
+        for motion, parts in windows.items()
+    }
+
+
+def _faster(motions: Sequence[LeftOpen], reach: float) -> FasterError | None:
+    """What is left open of the sine that is faster than any test."""
+    for part in motions:
+        if part.faster:
+            rows = left_open_over(part.record, WINDOWS["fast"]) / reach
+            square = mean_square_bound(rows[np.isfinite(rows).all(axis=1)], BOUND_LEVEL)
+            return FasterError(part.faster, float(np.sqrt(square)))
+    return None
+
+
+def _class_errors(
+    cells: Sequence[WindowCell], coefficients: Array, left_open: Mapping[MotionClass, float]
+) -> Iterator[ClassError]:
+    """The stated error of each class of motion that some window has.
+
+    `left_open` are mean squares of reference motions, by class.
+    """
     for motion in get_args(MotionClass):
         of_class = [cell for cell in cells if cell.motion == motion]
         if of_class:
             terms = np.vstack([cell.terms for cell in of_class])
-            modelled = float(np.sqrt(np.mean(terms @ coefficients)))
+            square = left_open.get(motion, 0.0)
+            modelled = float(np.sqrt(np.mean(terms @ coefficients) + square))
             yield ClassError(
                 motion=motion,
                 error=max(modelled, _shown_error(of_class)),
                 fitted=sum(not cell.held_out for cell in of_class),
                 held_out=sum(cell.held_out for cell in of_class),
+                left_open=float(np.sqrt(square)),
             )
 
 
@@ -562,12 +658,19 @@ def raised(prediction: PredictionError, reach: float, level: float) -> Array:
     return np.asarray(coefficients * np.exp(USUAL_SPREAD * further))
 
 
-def log_ratio(cells: Sequence[WindowCell], coefficients: Array) -> float:
+def log_ratio(
+    cells: Sequence[WindowCell], coefficients: Array, level: float | None = None
+) -> float:
     """Logarithm of the observed over the fitted squares of some windows.
 
-    Observed are at least what the noise's own scatter leaves open.
+    Observed are at least what the noise's own scatter leaves open. With a `level` the fitted ones
+    contain what the numbers of the machine leave open with that probability.
     """
     fitted = sum(float(np.sum(cell.terms @ coefficients)) for cell in cells)
+    if level is not None:
+        fitted += sum(
+            len(cell.left_open) * mean_square_bound(cell.left_open, level) for cell in cells
+        )
     observed = sum(float(np.sum(cell.squares)) for cell in cells)
     noise = sum(cell.noise * cell.squares.size for cell in cells)
     count = sum(cell.squares.size for cell in cells)

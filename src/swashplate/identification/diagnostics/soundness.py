@@ -143,7 +143,8 @@ def unexplained_runs(
     a new maneuver is: `discrepancy.bound_of_variance`, here for the probability that no run of a
     sound campaign exceeds it, shared among the runs (Bonferroni). A run that was held out
     is no part of this, so that several which are wrong, or all, cannot vouch for each other. What
-    the instrument's gain may be off is expected of the motion. Of a drive that is only compared
+    the instrument's gain may be off is expected of the motion, and so is what the fit leaves open
+    of this run. Of a drive that is only compared
     with runs the errors that its fit stated say it. A run whose command goes beyond those of the
     fitted runs is an extrapolation, of which they let one expect nothing: it is not judged here,
     but the stated error is no less than its own.
@@ -156,8 +157,8 @@ def unexplained_runs(
     named = set[str]()
     runs = {quality.experiment.name for quality in predicted}
     level = 1.0 - FALSE_ALARM / len(runs)
-    for channel, records, cells, median, limit in _expectations(stages, predicted, expected, level):
-        for finding in _beyond(channel, records, cells, median, limit):
+    for expectation in _expectations(stages, predicted, expected, level):
+        for finding in _beyond(expectation):
             if finding.run not in named:
                 named.add(str(finding.run))
                 yield finding
@@ -199,6 +200,8 @@ class _Expectation(NamedTuple):
     """(3,) coefficients of the squared error that half of all new maneuvers do not exceed."""
     limit: Array
     """(3,) of the one that no run of a sound campaign exceeds."""
+    level: float
+    """Probability of that, for one run."""
 
 
 def _expectations(
@@ -217,7 +220,7 @@ def _expectations(
                 continue
             median, limit = bound_of_variance(fitted, 0.5), bound_of_variance(fitted, level)
             limit[1] += _gain(channel, predicted) ** 2 / 3.0
-            yield _Expectation(channel, records, cells, median, limit)
+            yield _Expectation(channel, records, cells, median, limit, level)
     for stated in () if stages else expected:
         records = ErrorsOfRuns(
             tuple((q, None, True) for q in predicted if q.channel == stated.channel)
@@ -225,7 +228,7 @@ def _expectations(
         cells, reach = cells_of(records)
         if cells:
             median, limit = raised(stated, reach, 0.5), raised(stated, reach, level)
-            yield _Expectation(stated.channel, records, cells, median, limit)
+            yield _Expectation(stated.channel, records, cells, median, limit, level)
 
 
 def _gain(channel: str, predicted: Sequence[RunQuality]) -> float:
@@ -234,23 +237,18 @@ def _gain(channel: str, predicted: Sequence[RunQuality]) -> float:
     return max(gains, default=0.0)
 
 
-def _beyond(
-    channel: str,
-    records: ErrorsOfRuns,
-    cells: Sequence[WindowCell],
-    median: Array,
-    limit: Array,
-) -> Iterator[Finding]:
-    """Runs that were held out whose squares are beyond the limit of an `_Expectation`."""
+def _beyond(expectation: _Expectation) -> Iterator[Finding]:
+    """Runs that were held out whose squares are beyond the limit."""
+    channel, records, cells, median, limit, level = expectation
     by_run = defaultdict[str, list[WindowCell]](list)
     for cell in cells:
         if cell.held_out:
             by_run[cell.run].append(cell)
     for run, of_run in by_run.items():
-        if log_ratio(of_run, limit) <= 0.0:
+        if log_ratio(of_run, limit, level) <= 0.0:
             continue
         record = next(record for record in records if record.run == run)
-        error_ratio = float(np.exp(0.5 * log_ratio(of_run, median)))
+        error_ratio = float(np.exp(0.5 * log_ratio(of_run, median, 0.5)))
         fault = (
             f"{run}: '{channel}', which was held out, is {error_ratio:.2g} times as far from the "
             "prediction as the fitted runs lead one to expect"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import defaultdict
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from html import escape
@@ -14,10 +15,12 @@ from swashplate.identification.diagnostics.causes import Cause, causes_of, fixed
 from swashplate.identification.diagnostics.data_checks import Finding
 from swashplate.identification.diagnostics.discrepancy import (
     ClassError,
+    LeftOpen,
     MotionClass,
     PredictionError,
     prediction_errors,
 )
+from swashplate.identification.diagnostics.reference_motions import motions_left_open
 from swashplate.identification.diagnostics.soundness import (
     CommandRange,
     JudgedRuns,
@@ -34,6 +37,7 @@ from swashplate.identification.estimation.drive_model import (
 from swashplate.identification.estimation.solving import Solution
 from swashplate.identification.stage_fit import StageFit
 from swashplate.identification.statistics.determination import WIDE, weak_unknowns
+from swashplate.identification.statistics.posterior import Posterior
 from swashplate.identification.validation import RunQuality, percent
 from swashplate.parameters import COLUMNS
 from swashplate.results import Result, listing
@@ -188,6 +192,12 @@ class Verdict(Result):
                 sentences += (
                     f" {prediction.signal}: unknown in {listed(unknown)}, as no run has it."
                 )
+            faster = prediction.faster
+            if faster is not None and faster.error > prediction.worst.error:
+                sentences += (
+                    f" Faster than any test, in a sine of {faster.frequency:g} Hz with the largest "
+                    f"commands, {prediction.signal} is known only within {percent(faster.error)}."
+                )
         return sentences
 
     @property
@@ -307,6 +317,7 @@ def assess_fit(
     planned: Sequence[str] = (),
     required: float = REQUIRED,
     of_fit: Verdict | None = None,
+    posterior: Posterior | None = None,
 ) -> Verdict:
     """Judge a fit, or a drive by what it predicts.
 
@@ -323,13 +334,22 @@ def assess_fit(
     of_fit : Verdict, optional
         The verdict on the fit of a drive that is only compared with runs: one that is farther off
         than the errors that it states lead one to expect is named.
+    posterior : Posterior, optional
+        What the fit leaves open of the machine's numbers, and so of a new maneuver.
     """
     expected = () if of_fit is None else of_fit.predictions
     commands = None if of_fit is None else of_fit.commands
     unsound = tuple(unsound_data(stages, predicted, expected, commands))
     named = {str(finding.run) for finding in unsound}
     held_out = {quality.experiment.name for quality in predicted}
-    predictions = prediction_errors(stages, predicted, named & held_out)
+    tested = {run.name: run for run in _fitted_runs(stages)}
+    tested |= {quality.experiment.name: quality.experiment for quality in predicted}
+    motions = defaultdict[str, list[LeftOpen]](list)
+    if posterior is not None:
+        fastest = _fastest_sine(tested)
+        for motion, channel, record in motions_left_open(stages, posterior, fastest):
+            motions[channel].append(LeftOpen(record, motion.faster))
+    predictions = prediction_errors(stages, predicted, named & held_out, motions)
     decisive = _decisive(predictions, stages, predicted)
     if not stages:
         return Verdict(required, predictions, decisive, fitted=False, unsound=unsound)
@@ -342,8 +362,6 @@ def assess_fit(
         if unknown.run is None
     ]
     causes = None if unfinished or unsound else causes_of(stages)
-    tested = {run.name: run for run in _fitted_runs(stages)}
-    tested |= {quality.experiment.name: quality.experiment for quality in predicted}
     return Verdict(
         required,
         predictions,

@@ -328,7 +328,7 @@ class DriveModel(Result, EquationModel):
 
     def signals_of(self, experiment: Experiment) -> Mapping[str, str]:
         """Signal for each channel that this part of the drive gives."""
-        kinds = kinds_of(self.part)
+        kinds = kinds_of(self._part_of(experiment))
         channels = experiment.channels.items()
         return {name: SIGNALS[channel.kind] for name, channel in channels if channel.kind in kinds}
 
@@ -340,7 +340,7 @@ class DriveModel(Result, EquationModel):
         With the edges of the command where `values` say.
         """
         with_instants = with_edges(experiment, values)
-        if self.part != "pump":
+        if self._part_of(experiment) != "pump":
             return "voltage", voltage_record(with_instants), {}
         given = self.currents.get(experiment.name)
         if with_instants is not experiment:
@@ -348,6 +348,11 @@ class DriveModel(Result, EquationModel):
                 with_instants, self.parameters, self.starts.get(with_instants.name, {})
             )
         return "current", measured_current(experiment) if given is None else given, {}
+
+    def _part_of(self, experiment: Experiment) -> DrivePart:
+        """What an experiment drives: of the whole drive only the pump if a current drives it."""
+        by_current = self.part == "chain" and experiment.input.kind == "current"
+        return "pump" if by_current else self.part
 
     def ready(
         self, values: Mapping[str, float], experiment: Experiment, request: SimulationRequest

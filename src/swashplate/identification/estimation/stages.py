@@ -44,7 +44,6 @@ from swashplate.identification.estimation.setup import (
     deviation,
     free_entries,
     load_setup,
-    setup_names,
 )
 from swashplate.identification.estimation.unknowns import Unknown, Unknowns, bounded
 from swashplate.machine.marching import Record
@@ -176,28 +175,24 @@ def setup_of(
 ) -> FitSetup:
     """The fit setup of an axis.
 
-    By default the packaged one of the drive that the campaign names, or else of the given one; an
-    `InputError` if there is none. Without a measured current it is `whole_drive` of that drive,
-    since nothing then tells the amplifier's numbers from the pump's. `free` as of `as_fit_setup`.
+    By default `whole_drive` of the given drive, of its pump alone if currents drive all runs. Of
+    the drive that stands for no machine nothing is known beforehand: it has a packaged setup.
+    `free` as of `as_fit_setup`.
     """
     runs = campaign.select(axis=axis, role="fit")
     if free is not None:
         return as_fit_setup(free, runs, drive.definitions)
-    kinds = {channel.kind for run in runs for channel in run.channels.values()}
-    by_voltage = all(run.input.kind == "voltage" for run in runs)
-    if by_voltage and kinds.isdisjoint(CURRENTS) and drive.name != UNKNOWN_MACHINE:
-        return whole_drive(drive)
-    name = drive.name if campaign.axes[axis].drive is None else campaign.drive(axis).name
-    if name not in setup_names():
-        raise InputError(
-            f"There is no packaged fit setup for the drive '{name}': give a user-defined one, a "
-            ".toml file with stages and free parameters; 'swashplate guess' derives one from the "
-            "logs."
-        )
-    return load_setup(name)
+    if drive.name == UNKNOWN_MACHINE:
+        return load_setup(UNKNOWN_MACHINE)
+    by_current = all(run.input.kind == "current" for run in runs)
+    return whole_drive(drive, part="pump" if by_current else "chain")
 
 
-def whole_drive(parameters: ParameterSet, spread: float = LIKE_NAMED) -> FitSetup:
+def whole_drive(
+    parameters: ParameterSet,
+    spread: float = LIKE_NAMED,
+    part: Literal["pump", "chain"] = "chain",
+) -> FitSetup:
     """A fit setup of every number that is not 0 or off, in one stage through the whole drive.
 
     Each is known beforehand to within a share of its nominal value: what the tests determine
@@ -210,6 +205,8 @@ def whole_drive(parameters: ParameterSet, spread: float = LIKE_NAMED) -> FitSetu
         The drive that the machine is like.
     spread : float
         Standard deviation of a number, as a share of its nominal value. [1]
+    part : {"chain", "pump"}
+        The whole drive, or pump and motor without their amplifier.
 
     Returns
     -------
@@ -218,7 +215,8 @@ def whole_drive(parameters: ParameterSet, spread: float = LIKE_NAMED) -> FitSetu
     """
     free = dict[str, Free]()
     for symbol, parameter in parameters.items():
-        if parameter.definition.block == "refinements":
+        block = parameter.definition.block
+        if block == "refinements" or (part == "pump" and block == "control_card"):
             continue
         moved = [
             column
@@ -228,7 +226,7 @@ def whole_drive(parameters: ParameterSet, spread: float = LIKE_NAMED) -> FitSetu
         names = [symbol] if len(moved) == len(parameter.numbers) else moved
         free |= {name: Free(spread=spread) for name in names}
     title = f"every number of {parameters.name}, known to within {100.0 * spread:g} %"
-    return FitSetup(title=title, stages=(Stage(name="drive", part="chain", free=free),))
+    return FitSetup(title=title, stages=(Stage(name="drive", part=part, free=free),))
 
 
 def stage_problem(

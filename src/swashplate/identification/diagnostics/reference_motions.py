@@ -1,0 +1,149 @@
+"""Motions by which it is judged what a fit leaves open of a drive, whatever its tests were.
+
+A stair through all commands that the tests had, steps to the largest ones, and a sine as fast as
+the fastest of the tests: what a drive is used for. Beside them a faster sine, which no test needs
+to have and which tells most where the tests are slow.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from swashplate.campaign import Experiment
+from swashplate.errors import DomainError, InputError
+from swashplate.identification.diagnostics.discrepancy import TIME, ChannelErrors
+from swashplate.identification.estimation.drive_model import DriveModel
+from swashplate.identification.estimation.model import linearised as linearised_model
+from swashplate.identification.stage_fit import StageFit
+from swashplate.identification.statistics.posterior import Posterior
+from swashplate.machine.marching import SOURCE_RATE
+
+Array = NDArray[np.float64]
+
+LEVELS = 10
+"""Levels of the stair, each way."""
+HELD = 1.0
+"""Time for which a level of the stair is held; a step three times as long. [s]"""
+PERIODS = 3
+"""Of a sine."""
+FASTER = 0.5
+"""Frequency of the faster sine: an operator who swings the stick. [Hz]"""
+SAMPLED = 64.0
+"""Rate at which a reference motion is looked at. [Hz]"""
+
+
+class ReferenceMotion(NamedTuple):
+    """A command that no log needs to have, in the unit of the campaign's commands."""
+
+    name: str
+    values: Array
+    """(n,) samples at `SOURCE_RATE`."""
+    faster: float = 0.0
+    """Frequency of a sine that is faster than any test; 0 of any other. [Hz]"""
+
+
+def reference_motions(low: float, high: float, fastest: float) -> Iterator[ReferenceMotion]:
+    """The motions between two commands, 0 within them, for tests with sines of up to a frequency.
+
+    Without a sine in the tests `fastest` is 0.
+    """
+    low, high = min(low, 0.0), max(high, 0.0)
+    ends = [end for end in (high, low) if end != 0.0]
+    up = np.arange(LEVELS + 1) / LEVELS
+    stair = np.concatenate([end * np.concatenate([up, up[-2:0:-1]]) for end in ends])
+    yield ReferenceMotion("stair", _held([*stair, 0.0], HELD))
+    yield ReferenceMotion("steps", _held([0.0, *ends, 0.0], 3.0 * HELD))
+    if fastest > 0.0:
+        yield ReferenceMotion("sine", _sine(low, high, fastest))
+    if fastest < FASTER:
+        yield ReferenceMotion("faster sine", _sine(low, high, FASTER), FASTER)
+
+
+def _held(levels: Sequence[float], duration: float) -> Array:
+    """Levels one after another, each for so long [s]."""
+    return np.repeat(np.array(levels), round(duration * SOURCE_RATE))
+
+
+def _sine(low: float, high: float, frequency: float) -> Array:
+    """A sine that begins at 0 and reaches both ends; half waves of one sign if one of them is 0."""
+    time = np.arange(round(PERIODS / frequency * SOURCE_RATE)) / SOURCE_RATE
+    wave = np.sin(2.0 * np.pi * frequency * time)
+    size_down = -low if low < 0.0 else -high
+    return np.where(wave > 0.0, high if high > 0.0 else low, size_down) * wave
+
+
+def motions_left_open(
+    stages: Sequence[StageFit], posterior: Posterior, fastest: float
+) -> Iterator[tuple[ReferenceMotion, str, ChannelErrors]]:
+    """What the posterior leaves open of each channel in each reference motion of a drive.
+
+    Nothing of a user-defined model, or of a drive that does not hold under such a command.
+    """
+    if not stages or not isinstance(stages[-1].problem.model, DriveModel) or not posterior.names:
+        return
+    runs = {run.name: run for stage in stages for run in stage.problem.experiments}
+    by_voltage = [run for run in runs.values() if run.input.kind == "voltage"]
+    alike = by_voltage or list(runs.values())
+    template = max(alike, key=lambda run: len(run.channels))
+    low = min(float(run.input.values.min()) for run in alike)
+    high = max(float(run.input.values.max()) for run in alike)
+    if low == high == 0.0:
+        return
+    model = DriveModel(stages[-1].drive.parameters)
+    for motion in reference_motions(low, high, fastest):
+        experiment = _moved(template, motion.values)
+        try:
+            response = linearised_model(model, {}, experiment, posterior.names)
+        except (DomainError, InputError):
+            continue
+        for name, part in response.items():
+            errors = part.by @ posterior.changes
+            yield motion, name, _record(motion, experiment, name, part.values, errors)
+
+
+def _moved(template: Experiment, command: Array) -> Experiment:
+    """A run with another command, in which each channel would be read evenly."""
+    time = np.arange(command.size) / SOURCE_RATE
+    stamps = np.arange(0.0, time[-1], 1.0 / SAMPLED)
+    channels = {
+        name: replace(
+            channel,
+            time=stamps,
+            values=np.zeros(stamps.size),
+            weight=np.ones(stamps.size),
+            counts=None,
+        )
+        for name, channel in template.channels.items()
+    }
+    signal = replace(template.input, time=time, values=command, interpolation="linear")
+    return replace(template, input=signal, channels=channels, start="rest", start_pressure=None)
+
+
+def _record(
+    motion: ReferenceMotion, experiment: Experiment, name: str, simulated: Array, errors: Array
+) -> ChannelErrors:
+    """A channel of a reference motion, which errs by nothing but what is left open of it."""
+    channel, step = experiment[name], 1.0 / SAMPLED
+    signal = np.gradient(simulated, step) if channel.is_position else simulated
+    nothing = np.zeros(simulated.size)
+    return ChannelErrors(
+        run=motion.name,
+        maneuver=motion.name,
+        held_out=True,
+        start=0.0,
+        step=step,
+        measured=simulated,
+        error=nothing,
+        noise=0.0,
+        rounding=nothing,
+        signal=signal,
+        rate=TIME * np.gradient(signal, step),
+        command=experiment.input.at(channel.time),
+        is_position=channel.is_position,
+        left_open=errors,
+    )
