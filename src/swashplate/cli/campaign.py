@@ -621,9 +621,10 @@ def advise(
             commanded = ranges_of_input(experiments)
         else:
             untested = parsing.parameters_of(subject)
-            of_fit = parsing.verdict_of_fit(subject, untested.numbers)
-            if of_fit and of_fit.commands and of_fit.commands.kind == "voltage":
-                commanded = [(of_fit.commands.low, of_fit.commands.high)]
+            of_fit = parsing.fit_of(subject, untested.numbers)
+            commands = None if of_fit is None else of_fit.verdict.commands
+            if commands is not None and commands.kind == "voltage":
+                commanded = [(commands.low, commands.high)]
             prior = prior_information(smooth(untested), load_setup(setup or untested.name))
         machine = Drive(prior.parameters)
         most = largest_of_machine(commanded) if largest is None else (largest, largest)

@@ -347,11 +347,12 @@ def validate(
         if model is not None:
             parameters = parsing.model_parameters_of(drive, model, runs)
         assert parameters is not None
-        predicted = predict(parameters, runs)
+        of_fit = parsing.fit_of(drive, parameters.numbers)
+        predicted = predict(parameters, runs, None if of_fit is None else of_fit.posterior)
         if not predicted:
             raise InputError(f"{path}: all samples of these runs are ignored; nothing is left.")
-        of_fit = parsing.verdict_of_fit(drive, parameters.numbers)
-        verdict = assess_fit((), predicted, required=require / 100.0, of_fit=of_fit)
+        stated = None if of_fit is None else of_fit.verdict
+        verdict = assess_fit((), predicted, required=require / 100.0, of_fit=stated)
         measures = runs_tables(with_speeds(predicted))
     lines = []
     if out is not None:

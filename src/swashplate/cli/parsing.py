@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from swashplate.analysis import FactorRange
     from swashplate.campaign import Campaign, Experiment
     from swashplate.drive import Drive
-    from swashplate.identification import FitSetup, ModelSetup, Verdict
+    from swashplate.identification import FitSetup, ModelSetup, StoredVerdict
     from swashplate.logs import TextOptions
     from swashplate.parameters import Change, Parameter, ParameterSet
 
@@ -218,8 +218,8 @@ def fitted_numbers(
     return {name: float(value) for name, value in table.items()}
 
 
-def verdict_of_fit(word: str, numbers: Mapping[str, float]) -> Verdict | None:
-    """The verdict on the fit whose folder, or a file in it, is named.
+def fit_of(word: str, numbers: Mapping[str, float]) -> StoredVerdict | None:
+    """The verdict on the fit whose folder, or a file in it, is named, and what it rests on.
 
     None if there is no such fit, or if these numbers are not its own.
     """
@@ -233,7 +233,7 @@ def verdict_of_fit(word: str, numbers: Mapping[str, float]) -> Verdict | None:
         return None
     if stored is None or stored.numbers != dict(numbers):
         return None
-    return stored.verdict
+    return stored
 
 
 # --- changes and design variables -----------------------------------------------------------------

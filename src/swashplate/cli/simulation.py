@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from importlib import resources
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -28,6 +28,12 @@ from swashplate.cli.terminal import draw_figure, note, save, say, show, spinner
 from swashplate.documents import parse_toml
 from swashplate.errors import InputError
 from swashplate.tables import Column, Table, quantity, write_table
+
+if TYPE_CHECKING:
+    import polars
+
+    from swashplate.identification import Band
+    from swashplate.machine import Run
 
 app = typer.Typer(rich_markup_mode="rich")
 
@@ -61,20 +67,32 @@ def simulate(
     Of a drive: the largest speeds and currents, the distance travelled, and how
     long each limit acted (the dead zone only while the command is not 0 V). Of a
     machine of your own: lowest, highest and last value of each signal, and how
-    long each limit acted. --out writes all signals, --plot draws them.
+    long each limit acted. Of a fitted drive also the band in which the machine's
+    own speed lies. --out writes all signals, --plot draws them.
     'swashplate --help' lists the maneuvers.
     """
     with spinner("Simulating"):
         name, run = trials.run_of(machine, maneuver, sampling)
         tables = run_tables(machine.own, run)
         title = f"{machine.title}, {name}"
-    save(out, "All signals, in SI", run.write)
+        band = trials.band_of(machine, run)
+    save(out, "All signals, in SI", lambda path: write_table(_with_band(run, band), path))
     window = trials.window_of(run.time, begin, end)
     if plot is not None:
         draw_figure(plot, run.plot(window=window, title=title))
     duration = f"{run.time[-1] - run.time[0]:.6g} s"
     machine.note(f"{title}: {run.time.size} samples at {run.record.rate:g} Hz, {duration}")
     show(*tables)
+    if band is not None:
+        say(band.sentence)
+
+
+def _with_band(run: Run, band: Band | None) -> polars.DataFrame:
+    """All signals of a run, and both ends of a band of its speed."""
+    frame = run.to_polars()
+    if band is None:
+        return frame
+    return frame.with_columns(band.to_polars().select("shaft_speed_lower", "shaft_speed_upper"))
 
 
 @command(

@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from swashplate.cli.machines import OwnMachine
     from swashplate.cli.options import CommandSampling, MachineChoice, Simulating, Start
     from swashplate.drive import Drive, Simulation
+    from swashplate.identification import Band
     from swashplate.logs import Log, Series
     from swashplate.machine import Run
     from swashplate.maneuvers import Maneuver
@@ -71,6 +72,21 @@ def run_of(machine: MachineChoice, command: str, options: Simulating) -> tuple[s
     if machine.own is not None:
         return own_run(machine.own, command, options)
     return simulated_as(at_rate(machine.loaded_drive, options.rate), command, options)
+
+
+def band_of(machine: MachineChoice, run: Run) -> Band | None:
+    """The band about the speed of a run of a fitted drive; None of any other machine."""
+    from swashplate.cli.parsing import fit_of
+    from swashplate.drive import Simulation
+    from swashplate.identification import speed_band
+
+    if not isinstance(run, Simulation):
+        return None
+    drive = machine.loaded_drive
+    fit = fit_of(machine.drive, drive.parameters.numbers)
+    if fit is None or fit.posterior is None:
+        return None
+    return speed_band(drive, run, fit.verdict, fit.posterior)
 
 
 def simulated_as(drive: Drive, command: str, options: Simulating) -> tuple[str, Simulation]:

@@ -1,6 +1,7 @@
 from .derivatives import ALL_COLUMNS as ALL_COLUMNS
 from .derivatives import PUMP_COLUMNS as PUMP_COLUMNS
 from .derivatives import bound_drive as bound_drive
+from .derivatives import drive_sensitivities as drive_sensitivities
 from .derivatives import requested_columns as requested_columns
 from .drive import Drive as Drive
 from .equilibrium import OperatingPoint as OperatingPoint

@@ -1,8 +1,11 @@
 from .assessment import Identification as Identification
+from .assessment import StoredVerdict as StoredVerdict
 from .assessment import motion_of as motion_of
 from .assessment import parts_of as parts_of
 from .assessment import read_verdict as read_verdict
 from .assessment import versions as versions
+from .band import Band as Band
+from .band import speed_band as speed_band
 from .diagnostics.verdict import Verdict as Verdict
 from .diagnostics.verdict import assess_fit as assess_fit
 from .estimation.drive_model import DriveModel as DriveModel
@@ -11,6 +14,7 @@ from .estimation.model import Linearised as Linearised
 from .estimation.model import MachineModel as MachineModel
 from .estimation.model import UserModel as UserModel
 from .estimation.model_setup import ModelSetup as ModelSetup
+from .estimation.posterior import Posterior as Posterior
 from .estimation.problem import Problem as Problem
 from .estimation.problem import linearised_fit as linearised_fit
 from .estimation.setup import FitSetup as FitSetup
@@ -53,6 +57,7 @@ from .statistics.model_design import model_prior_information as model_prior_info
 from .statistics.model_design import model_run_information as model_run_information
 from .statistics.profiles import Profile as Profile
 from .statistics.profiles import profiles_of as profiles_of
+from .statistics.propagation import posterior_of as posterior_of
 from .tables import estimates_table as estimates_table
 from .tables import fixed_table as fixed_table
 from .tables import ignored_words as ignored_words

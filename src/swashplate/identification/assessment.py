@@ -11,21 +11,24 @@ from functools import cached_property
 from html import escape
 from importlib import import_module
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Unpack
 
 import numpy as np
+from numpy.typing import ArrayLike
 from pydantic import Field, model_validator
 from tomlkit import dumps
 
 from swashplate.__about__ import __version__
 from swashplate.campaign import Between, Campaign, Experiment
 from swashplate.documents import read_json
-from swashplate.drive import Drive
+from swashplate.drive import Drive, RunKeywords
 from swashplate.entries import Document, FileTable
 from swashplate.errors import DomainError, FileError, InputError, MissingFileError
 from swashplate.identification import tables
+from swashplate.identification.band import Band, speed_band
 from swashplate.identification.diagnostics.verdict import REQUIRED, Verdict, assess_fit
 from swashplate.identification.estimation.model_setup import ModelSetup
+from swashplate.identification.estimation.posterior import Posterior
 from swashplate.identification.estimation.problem import Problem
 from swashplate.identification.estimation.setup import FitSetup, Stage, setup_text
 from swashplate.identification.estimation.solving import Solution
@@ -46,10 +49,12 @@ from swashplate.identification.statistics.intervals import (
     intervals_of,
     unseen_limits,
 )
-from swashplate.identification.statistics.posterior import Posterior, posterior_of
 from swashplate.identification.statistics.profiles import Profile
+from swashplate.identification.statistics.propagation import posterior_of
 from swashplate.identification.validation import RunQuality, predict
 from swashplate.locks import locked
+from swashplate.machine.marching import SOURCE_RATE, Start
+from swashplate.maneuvers import Maneuver
 from swashplate.parameters import (
     FITTED_DRIVE,
     FITTED_NUMBERS,
@@ -167,6 +172,39 @@ class Identification(Estimated):
                 required=self.required,
                 posterior=self.posterior,
             )
+
+    def band(
+        self,
+        voltage: ArrayLike | Maneuver,
+        rate: float = SOURCE_RATE,
+        *,
+        start: Start = "rest",
+        **keywords: Unpack[RunKeywords],
+    ) -> Band:
+        """Simulate the fitted drive, with the band in which the machine's own speed lies.
+
+        Parameters
+        ----------
+        voltage, rate, start, **keywords :
+            As of `Drive.simulate`.
+
+        Returns
+        -------
+        Band
+            Speed, and both ends of a band of 95 %.
+
+        Raises
+        ------
+        InputError
+            As `Drive.simulate`; for a user-defined model; and if no run of the fit measured how the
+            shaft moves.
+        """
+        drive = self.fit.drive
+        run = drive.simulate(voltage, rate, start=start, **keywords)
+        band = speed_band(drive, run, self.verdict, self.posterior)
+        if band is None:
+            raise InputError("No run of the fit moved: nothing is known of the error of a speed.")
+        return band
 
     def tables(self) -> list[Table]:
         """Stated errors, then estimates, profiles, errors of runs, cross-validation."""

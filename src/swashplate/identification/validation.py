@@ -33,7 +33,7 @@ from swashplate.parameters import HasParameters, ParameterSet, set_of
 from swashplate.results import Result, figures
 
 if TYPE_CHECKING:
-    from swashplate.identification.statistics.posterior import Posterior
+    from swashplate.identification.estimation.posterior import Posterior
     from swashplate.results import Figure
 Array = NDArray[np.float64]
 

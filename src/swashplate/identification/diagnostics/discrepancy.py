@@ -23,9 +23,9 @@ from scipy.signal import fftconvolve
 from scipy.special import stdtrit
 
 from swashplate.campaign import UNNAMED, Experiment
+from swashplate.identification.estimation.posterior import mean_square_bound
 from swashplate.identification.estimation.problem import LinearisedFit, LinearisedRun
 from swashplate.identification.stage_fit import StageFit
-from swashplate.identification.statistics.posterior import mean_square_bound
 from swashplate.identification.validation import RunQuality
 from swashplate.results import Result
 
@@ -442,16 +442,14 @@ class PredictionError(Result):
         """What is predicted, in words."""
         return f"speed from {self.channel}" if self.of_position else self.channel
 
-    def error(self, signal: Array, rate: Array) -> float:
-        """Stated error of a new maneuver, root mean square over the range.
+    def squares(self, signal: Array, rate: Array) -> Array:
+        """(n,) mean square that the model's own error does not exceed in nine of ten maneuvers.
 
-        Parameters
-        ----------
-        signal, rate : (n,) arrays
-            What is predicted, of a position its speed, and its change within 0.1 s. [unit]
+        [unit²], for what is predicted and its change within 0.1 s, (n,) each, of a position those
+        of its speed. [unit]
         """
         terms = variance_terms(signal / self.reach, rate / self.reach)
-        return float(np.sqrt(np.mean(terms @ self.coefficients)))
+        return np.asarray(self.reach**2 * (terms @ self.coefficients))
 
 
 def prediction_errors(

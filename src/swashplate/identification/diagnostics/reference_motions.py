@@ -19,8 +19,8 @@ from swashplate.errors import DomainError, InputError
 from swashplate.identification.diagnostics.discrepancy import TIME, ChannelErrors
 from swashplate.identification.estimation.drive_model import DriveModel
 from swashplate.identification.estimation.model import linearised as linearised_model
+from swashplate.identification.estimation.posterior import Posterior
 from swashplate.identification.stage_fit import StageFit
-from swashplate.identification.statistics.posterior import Posterior
 from swashplate.machine.marching import SOURCE_RATE
 
 Array = NDArray[np.float64]

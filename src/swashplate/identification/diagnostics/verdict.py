@@ -34,10 +34,10 @@ from swashplate.identification.estimation.drive_model import (
     DriveModel,
     limits_reached,
 )
+from swashplate.identification.estimation.posterior import Posterior
 from swashplate.identification.estimation.solving import Solution
 from swashplate.identification.stage_fit import StageFit
 from swashplate.identification.statistics.determination import WIDE, weak_unknowns
-from swashplate.identification.statistics.posterior import Posterior
 from swashplate.identification.validation import RunQuality, percent
 from swashplate.parameters import COLUMNS
 from swashplate.results import Result, listing
