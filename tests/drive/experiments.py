@@ -27,7 +27,8 @@ ALL = {
     **STICTION,
     **LOAD,
     **RIPPLE,
-    **{"solenoid_hysteresis": 0.005, "swash_damping": 0.02, "line_stiffness": 1e6},
+    **{"solenoid_delay": 0.0123, "solenoid_lag": 0.015, "solenoid_hysteresis": 0.005},
+    **{"swash_damping": 0.02, "line_stiffness": 1e6},
 }
 """Every refinement."""
 SWING = maneuvers.sine(3.0, 0.8, start=0.05, length=3.0, settle=0.4).sample(RATE)

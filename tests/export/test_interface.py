@@ -42,7 +42,7 @@ def test_what_is_refused_leaves_the_drive_as_it_was(hoist: Drive, in_c: Any) -> 
             assert call(voltage) == BAD_VALUE
     for name, bad in (("Z10", 0.0), ("tau", 10.0), ("Z13_plus", 2.0), ("zeta_plus", float("nan"))):
         assert model.set(model.number("", name), bad) == BAD_VALUE, name
-    beyond = 1 + model.number("", "pump_speed")  # The last of the parameters.
+    beyond = 1 + model.number("", "solenoid_lag")  # The last of the parameters.
     assert model.set(-1, 1.0) == model.set(beyond, 1.0) == BAD_VALUE
     assert model.set_input(3, 1.0) == model.set_input(0, float("nan")) == BAD_VALUE
     assert model.clear_input(-1) == model.set_option(99, True) == BAD_VALUE
@@ -369,10 +369,10 @@ def test_feedthrough_is_what_a_jump_of_an_input_moves_at_once(
 
 
 def test_a_state_is_small(hoist: Drive, in_c: Any, compiled: Callable[..., Path]) -> None:
-    assert in_c(hoist).function("size")() <= 10_000
+    assert in_c(hoist).function("size")() <= 18_000
     short = compiled(drive_sources(), ["-DSWP_LINE=64"])
     model = in_c(hoist, H, short)
-    assert model.function("size")() <= 2_000
+    assert model.function("size")() <= 2_600
     run = hoist.simulate(COMMAND, 512.0, interpolation="previous")
     assert (model.run(COMMAND, ["shaft_speed"])["shaft_speed"] == run.shaft_speed).all()
 

@@ -26,7 +26,8 @@ FRICTION = {"spool_friction": 0.5, "spool_presliding": 5e-5, "dither_time": 0.6}
 LINE = {"line_stiffness": 1e6, "load_inertia": 5e3, "load_torque": 2e4}
 LEAKAGE = {"motor_leakage": 1e-6, "load_inertia": 5e3, "load_torque": 3e4}
 RIPPLE = {"cam_ripple": 0.01, "cam_ripple_per_torque": 5e-7, "load_torque": 3e4}
-EVERY = {**FRICTION, **LINE, **LEAKAGE, **RIPPLE, "solenoid_hysteresis": 0.01,
+LATE = {"solenoid_delay": 0.0123, "solenoid_lag": 0.015}
+EVERY = {**FRICTION, **LINE, **LEAKAGE, **RIPPLE, **LATE, "solenoid_hysteresis": 0.01,
          "swash_damping": 0.02, "motor_constant": 250.0}  # fmt: skip
 
 
@@ -93,6 +94,9 @@ BATTERY = [
     Case(changes=FRICTION), Case(changes=FRICTION, start="steady"),
     Case(changes={"spool_friction": 0.5, "spool_presliding": 5e-5}),
     Case(changes={"solenoid_hysteresis": 0.02}, start="steady"),
+    Case(changes=LATE), Case(changes=LATE, start="steady"), Case("slew", LATE, exact=True),
+    Case(changes={"solenoid_delay": 0.0004}), Case(changes={"solenoid_lag": 0.2}, start="steady"),
+    Case(late=LATE, start="steady", measured=("load_torque",)),
     Case(changes=RIPPLE), Case(changes={"swash_damping": 0.02}, start="steady"),
     Case(changes=LEAKAGE, start="steady"), Case(changes=LINE, start="steady"),
     Case(changes=LINE, measured=("load_torque",)),
@@ -288,7 +292,7 @@ def whole_interface(model: Any) -> None:
     assert not model.valid()
     # a search for the steady state that ends at an end of its bracket: as with leakage, and hardly
     # any supply pressure
-    flags = 1 + model.number("", "pump_speed") + 1
+    flags = 1 + model.number("", "solenoid_lag") + 1
     leaky, symmetric = flags + 3 + PumpOptions._fields.index("leaky"), flags + 3
     for on in (0.0, 1.0):
         values[leaky], values[symmetric], values[1 + model.number("", "Z9")] = 1.0, on, 1e3

@@ -13,10 +13,15 @@ LINE = {"line_stiffness": 1e6, "load_inertia": 5e3, "motor_leakage": 1e-6, "load
 REFINED = {
     "friction": {**FRICTION, "dither_time": 0.6},
     "friction without dither": FRICTION,
+    "delay": {"solenoid_delay": 0.0123},
+    "lag": {"solenoid_lag": 0.015},
     "damping": {"swash_damping": 0.02},
     "leakage": {"motor_leakage": 1e-6, "load_torque": 3e4, "load_inertia": 5e3},
     "line": LINE,
-    "all": {**FRICTION, "dither_time": 0.6, "swash_damping": 0.02, **LINE, "Z7": 0.4},
+    "all": {
+        **{**FRICTION, "dither_time": 0.6, "swash_damping": 0.02, **LINE, "Z7": 0.4},
+        **{"solenoid_delay": 0.0123, "solenoid_lag": 0.015},
+    },
 }
 VARIANTS = {
     "published": ({}, {}),
@@ -26,12 +31,15 @@ VARIANTS = {
     "whole delay": ({"tau": 7.0 / 512.0}, {}),
     "Coulomb": ({"C": 3.0}, {}),
     "split switches": ({}, {"card_switch": "split"}),
+    "late": ({"solenoid_delay": 0.0003, "solenoid_lag": 0.02}, {}),
     # together, so that few forms of the march are compiled; each by itself leads to the continuous
     # model below
     **{name: (REFINED[name], {}) for name in ("friction without dither", "leakage", "all")},
 }
 STEP = 1.0 / 512.0
 OUTPUTS = ("shaft_speed", "stroker_pressure", "orifice_opening", "current", "motor_torque")
+LATE = tuple(name for name in OUTPUTS if name != "current")
+"""Outputs behind the solenoids' delay."""
 MEASURED = {"load_torque": 3.0, "pump_speed": 1e-5, "supply_pressure": 10.0}
 """Sizes of small motions."""
 
@@ -64,11 +72,12 @@ def test_small_motions_of_the_simulation(
 ) -> None:
     drive = hoist.replace(**changes)
     drive = Drive(replace(drive.parameters, **forms))
-    model = drive.linearize(at, outputs=OUTPUTS, coulomb="tangent").discrete(rate)
+    outputs = LATE if "solenoid_delay" in changes else OUTPUTS
+    model = drive.linearize(at, outputs=outputs, coulomb="tangent").discrete(rate)
     u = 1e-5 * motion(300)
     run = drive.simulate(at + u, rate, start="steady")
     expected = marched(model, u)
-    for k, name in enumerate(OUTPUTS):
+    for k, name in enumerate(outputs):
         moved = getattr(run, name) - getattr(run, name)[0]
         # curvature of the maps: 1e-5 of the motion; rounding: 1e-9 of it
         assert np.abs(moved - expected[:, k]).max() <= 5e-5 * np.abs(moved).max(), name
@@ -109,7 +118,8 @@ def test_steady_gain_and_lag_do_not_depend_on_the_rate(axis: Drive) -> None:
 
 @pytest.mark.parametrize("changes", [{}, *REFINED.values()], ids=["published", *REFINED])
 def test_small_steps_lead_to_the_continuous_model(hoist: Drive, changes: dict) -> None:
-    model = hoist.replace(**changes).linearize(4.0, outputs=OUTPUTS)
+    outputs = LATE if "solenoid_delay" in changes else OUTPUTS
+    model = hoist.replace(**changes).linearize(4.0, outputs=outputs)
     f = np.array([0.1, 0.5, 2.0, 8.0])
     exact = model.response(f)
     errors = []
@@ -160,6 +170,7 @@ def test_states_of_the_refinements(hoist: Drive) -> None:
     added = {
         "friction": ("spool_deflection",),
         "friction without dither": (),
+        "delay": (),
         "damping": ("plate_pressure",),
         "leakage": (),
         "line": ("motor_torque", "shaft_speed"),
@@ -211,7 +222,8 @@ def test_small_sines_of_a_refined_drive_agree_with_the_linear_model(hoist: Drive
 @pytest.mark.parametrize("rate", [100.0, 512.0])
 def test_inputs_beside_the_voltage(hoist: Drive, name: str, rate: float) -> None:
     drive = hoist.replace(**REFINED[name])
-    model = drive.linearize(4.0, input=("voltage", *MEASURED), outputs=OUTPUTS)
+    outputs = LATE if "solenoid_delay" in REFINED[name] else OUTPUTS
+    model = drive.linearize(4.0, input=("voltage", *MEASURED), outputs=outputs)
     moved = {each: size * motion(300, k) for k, (each, size) in enumerate(MEASURED.items())}
     numbers = drive.parameters.numbers
     middle = {"load_torque": numbers["load_torque"], "pump_speed": 1.0}
@@ -220,13 +232,13 @@ def test_inputs_beside_the_voltage(hoist: Drive, name: str, rate: float) -> None
     given = {each: middle[each] + values for each, values in moved.items()}
     run = drive.simulate(4.0 + u, rate, start="steady", **given)
     expected = marched(model.discrete(rate), u, *moved.values())
-    for k, output in enumerate(OUTPUTS):
+    for k, output in enumerate(outputs):
         found = getattr(run, output) - getattr(run, output)[0]
         assert np.abs(found - expected[:, k]).max() <= 1e-4 * np.abs(found).max(), output
 
 
 def test_each_input_by_itself(hoist: Drive) -> None:
-    drive = hoist.replace(**LINE)
+    drive = hoist.replace(**LINE, solenoid_delay=0.04)
     together = drive.linearize(4.0, input=("voltage", *MEASURED))
     for name in MEASURED:
         alone = drive.linearize(4.0, input=name)

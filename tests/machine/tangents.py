@@ -185,9 +185,11 @@ def marched(
             )
             for part, state in zip(model.parts, states, strict=True)
         ]
+    records = {name: [*map(float, record)] for name, record in records.items()}
     holds = {"linear": linear, "previous": previous, "mean": mean_over_sample}
-    size = next(iter(records.values())).size
+    size = len(next(iter(records.values())))
     values, slopes = np.zeros(size), np.zeros((size, len(paths)))
+    between: dict[tuple[int, str], list[Any]] = {}
     for n in range(size):
         signals: dict[tuple[int, str], Any] = {}
         following = []
@@ -198,10 +200,15 @@ def marched(
             inputs = []
             for name in part.input_types:
                 link, tap = model.link_of(i, name), part.tap(name)
+                past: Any = records.get(tap.signal)
                 if link is not None:
                     args = [signals[source.part, source.signal] for source in link.sources]
                     value = args[0] if link.equation is None else link.equation(*args)
-                elif tap.signal not in records:
+                    past = between.setdefault((i, name), [])
+                    past.append(value)
+                if link is not None and name not in part.taps:
+                    pass
+                elif past is None:
                     value = value_at(p[i], part.defaults[name])
                 elif name not in part.taps:
                     value = float(records[tap.signal][n])
@@ -211,8 +218,7 @@ def marched(
                     late = late - tap.ahead if late.value > tap.ahead else lifted(0.0)
                     whole = math.floor(late.value)
                     window = tuple(
-                        float(records[tap.signal][n - whole - j]) if n >= whole + j else 0.0
-                        for j in range(tap.samples)
+                        past[n - whole - j] if n >= whole + j else 0.0 for j in range(tap.samples)
                     )
                     value = Window(window, late - whole)
                     if not tap.width:

@@ -81,7 +81,8 @@ INSTEAD = {
     "load_inertia": 5e3, "motor_leakage": 1e-6, "cam_ripple": 0.01, "cam_ripple_per_torque": 5e-7,
     "cam_phase": 0.3, "swash_damping": 0.02, "line_stiffness": 1e6, "motor_constant": 250.0,
     "G2": 1e-3, "G3": 1e-5, "C": 2.0, "lim1": 2.3, "lim2": 2.3, "I_t1": 0.35, "I_t2": 0.14,
-    "a": 20.0, "Z6": 0.07, "piston_leakage": 3e-11, "air_fraction": 0.01,
+    "a": 20.0, "Z6": 0.07, "piston_leakage": 3e-11, "air_fraction": 0.01, "solenoid_delay": 0.01,
+    "solenoid_lag": 0.015,
 }  # fmt: skip
 """Usual sizes of what a packaged set leaves off."""
 
@@ -105,7 +106,7 @@ RANGES = {
     "velocity": (-0.3, 0.3), "flow": (-1e-4, 1e-4), "piston_speed": (-0.1, 0.1),
     "motor_pressure": (-2e7, 2e7), "force": (-35.0, 35.0), "pressure": (-6e5, 6e5),
     "plate": (-6e5, 6e5), "plate_pressure": (-6e5, 6e5), "number": (0.0, 5.0),
-    "tau": (0.014, 0.014),
+    "tau": (0.014, 0.014), "lagged": AMPERES,
     "spool_position": (-3e-4, 3e-4), "spool_velocity": (-0.3, 0.3), "piston_pressure": (-6e5, 6e5),
     "step": (1e-5, 1e-4), "rise": (-0.01, 0.01), "substeps": (2.0, 2.0), "initialised": (1.0, 1.0),
     "moment": (-100.0, 100.0),
@@ -208,7 +209,7 @@ def hoist_machine(draw: Draw, _: dict[str, Any]) -> machine.Hydrostat:
 def pump_state(draw: Draw, known: dict[str, Any]) -> pump.PumpState:
     limits = control.pressure_limits(known["p"])
     pressures = [draw.uniform(0.98 * limits.lower, 0.98 * limits.upper) for _ in range(2)]
-    names = ("current", "position", *pump.PumpState._fields[4:-1])
+    names = (*("current",) * 3, "position", *pump.PumpState._fields[6:-1])
     return pump.PumpState(*pressures, *map(draw.number, names), 1.0)
 
 
@@ -235,6 +236,7 @@ MADE: dict[Any, Callable[[Draw, dict[str, Any]], Any]] = {
         draw.uniform(0.8, 1.2),
         draw.number("load_torque"),
         known["p"].Z9 * draw.uniform(0.9, 1.1),
+        draw.number("current"),
     ),
     pump.PumpState: pump_state,
     pump.PumpSignals: pump_signals,

@@ -135,7 +135,7 @@ def test_columns_of_three_drives_and_a_body(parameters: Body) -> None:
     instance = Machine(crane, p, options=options)
     values, slopes = marched(instance, given, 1.0 / RATE, "hung.load.x")
     assert np.array_equal(found.run["hung.load.x"], values)
-    assert len(found.names) == 233
+    assert len(found.names) == 239
     paths = list(parameter_paths(crane))
     off = {
         path

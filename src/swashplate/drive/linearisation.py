@@ -52,13 +52,33 @@ def linearize_drive(
         states=model.states,
         inputs=inputs,
         outputs=output_names,
-        delay=parameters.numbers["tau"] if inputs[0] == "voltage" else 0.0,
+        delay=_delay(parameters, inputs[0], output_names),
         units={name: UNITS[name] for name in (*inputs, *output_names)},
         at={"current": point.current} if point.voltage is None else {"voltage": point.voltage},
         operating_point=point,
         coulomb=coulomb,
         parameters=parameters,
     )
+
+
+def _delay(parameters: ParameterSet, command: str, outputs: tuple[str, ...]) -> float:
+    """Delay of the outputs behind the command. [s]
+
+    The solenoids' delay stands behind the card's dynamics, but small motions are linear and do not
+    change with time, so that it counts as well before the command.
+    """
+    card = parameters.numbers["tau"] if command == "voltage" else 0.0
+    solenoids = parameters.numbers.get("solenoid_delay", 0.0)
+    passes = command in ("voltage", "current") and "late" in parameters.options
+    if not passes or solenoids == 0.0:
+        return card
+    ahead = [name for name in outputs if name == "current"]
+    if ahead and len(ahead) < len(outputs):
+        raise InputError(
+            f"The current is not behind the solenoids' delay of {solenoids:g} s, and a linear "
+            "model has one delay, before its command: linearise for the current by itself."
+        )
+    return card if ahead else card + solenoids
 
 
 def _checked_inputs(names: tuple[str, ...]) -> tuple[str, ...]:

@@ -75,8 +75,8 @@ def small_motion_model(
     coulomb : {"ignored", "tangent"}
         Whether the card's Coulomb term counts, with its slope at rest.
     rate : float, optional
-        Steps a second; by default the model is in continuous time and leaves out the delay of the
-        card. [Hz]
+        Steps a second; by default the model is in continuous time and leaves out the delays of
+        card and solenoids. [Hz]
 
     Returns
     -------
@@ -105,7 +105,7 @@ def small_motion_model(
         command = "voltage"
         at = {command: point.voltage or nextafter(0.0, 1.0)}
     elif inputs[0] == "solenoid_force":
-        options = machine.options._replace(hysteresis=None)
+        options = machine.options._replace(late=None, hysteresis=None)
         machine = machine._replace(p=machine.p._replace(**FORCE), options=options)
         at = {"current": point.solenoid_force}
     p, options, _ = machine
@@ -174,7 +174,13 @@ def small_motion_model(
 def _names(side: str, step: float, options: Any, pump_options: PumpOptions) -> dict[str, str]:
     """Paths of the states that small motions can move and that count, and what they are called."""
     ending = "_before" if step > 0.0 else ""
-    names = {"pump.pressure": "stroker_pressure"}
+    names = dict[str, str]()
+    if pump_options.late is not None:
+        names |= {
+            "pump.lagged_current": f"lagged_current{ending}",
+            "pump.delayed_current": f"delayed_current{ending}",
+        }
+    names["pump.pressure"] = "stroker_pressure"
     if pump_options.damping is not None:
         names["pump.plate_pressure"] = "plate_pressure"
     names["pump.deflection"] = "spool_deflection"

@@ -153,7 +153,7 @@ def variables(
         for index, part in enumerate(exported.model.parts)
         for entry, path in _declared(part.parameters)
     }
-    delays = {(part, tap.delay) for part, _, _, tap in exported.taps}
+    delays = {(part, tap.delay) for part, _, _, tap, _ in exported.taps}
     for index, (part_number, path, name) in enumerate(parameters):
         if defaults.get(name) == name:  # an input of that name has its value
             continue

@@ -31,7 +31,9 @@ PRESSURE, ZERO, TRAVEL, FORCE, MOTION = "pressure", "zero", "travel", "force", "
 
 
 class Pump(NamedTuple):
-    """Parameters of pump and motor, then those of the refinements, then the prime mover's.
+    """Parameters of pump and motor, then those of the refinements, the prime mover's among them.
+
+    Exported models number them in this order: a new one comes last.
 
     Plausible is three to four decades about Kruse's machines and the packaged start, and beyond
     where machines are: each term of a solenoid's force reaches 10 kN at 10 mA, torques are those of
@@ -135,6 +137,12 @@ class Pump(NamedTuple):
         stands_for="K_mf", default=0.0, least=1e-06, plausible=(1e-3, 1e8))] = 0.0
     pump_speed: Annotated[float, Definition("speed of the prime mover, relative to that of Z10",
         "1", above=0.0, default=1.0, plausible=(0.0, 10.0))] = 1.0
+    solenoid_delay: Annotated[float, Definition("delay from current to spool", "s", lower=0.0,
+        upper=10.0, stands_for="T_d", default=0.0, switch="late", least=1e-06,
+        plausible=(0.0, 10.0))] = 0.0
+    solenoid_lag: Annotated[float, Definition("time constant of the lag from current to spool", "s",
+        lower=0.0, stands_for="T_l", default=0.0, switch="late", least=1e-06,
+        plausible=(0.0, 10.0))] = 0.0
     # fmt: on
 
 
@@ -173,6 +181,7 @@ class PumpOptions(NamedTuple):
     loaded: Flag = OFF  # Z12 counts: the speed depends on the swash plate's rate.
     steep: Flag = OFF  # A stop of the swash plate lies beyond 22.5°.
     friction: Flag = OFF  # Friction of spool and solenoid, see `held_back`.
+    late: Flag = OFF  # Delay and lag of the solenoids, see `lagged_current`.
     hysteresis: Flag = OFF  # Hysteresis of the solenoids, see `magnetising_current`.
     ripple: Flag = OFF  # Ripple of the cam ring, see `rippled_angle`.
     damping: Flag = OFF  # Damping of the swash plate, see `plate_follows`.

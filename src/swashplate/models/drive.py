@@ -67,12 +67,15 @@ pump_drive = join("pump_drive", source, pump, links=AMMETER, integrals=POSITION)
 """Pump and motor behind a signed current."""
 
 
-flowing_pump = replace(pump, step=pump_rates, parts=(), longest_step=inf)
+NOW = {"delayed_current": "current"}
+"""Where no sample is late, the delayed current is the current."""
+
+flowing_pump = replace(pump, step=pump_rates, parts=(), longest_step=inf, taps={}, wired=NOW)
 flowing_drive, flowing_pump_drive = (
     join(name, before, flowing_pump, links=AMMETER)
     for name, before in (("drive", flowing_card), ("pump_drive", source))
 )
-"""Both in continuous time: rates in place of the step, and no delay."""
+"""Both in continuous time: rates in place of the step, and no delays."""
 
 
 @equation
@@ -98,6 +101,7 @@ settled_drive = join(
         forgotten,
         settled_sample,
         inputs=PumpInputs,
+        wired=NOW,
         defaults=pump.defaults,
         options=PumpOptions,
     ),

@@ -8,7 +8,7 @@ stand in the same sample and the same step; an option that is off leaves nothing
 from math import sqrt
 from typing import Annotated, NamedTuple
 
-from swashplate.machine import Definition, Model, equation, root
+from swashplate.machine import Definition, Model, Tap, equation, root
 from swashplate.models.amplifier import LONGEST_STEP
 from swashplate.models.displacement_control import (
     Pump,
@@ -38,6 +38,8 @@ from swashplate.models.refinements import (
     dither_factor,
     friction_width,
     held_back,
+    lagged_current,
+    lagged_current_rate,
     line_rates,
     line_step,
     load_leakage,
@@ -91,6 +93,7 @@ class PumpInputs(NamedTuple):
     pump_speed: PumpSpeed  # Speed of the prime mover, relative to that of Z10. [1]
     load_torque: LoadTorque  # C_g of gravity at the shaft, positive against positive speed. [N m]
     supply_pressure: SupplyPressure  # Supply pressure less static pressure, in place of Z9. [Pa]
+    delayed_current: float  # The same current T_d ago (lateness). [A]
 
 
 class PumpState(NamedTuple):
@@ -102,6 +105,8 @@ class PumpState(NamedTuple):
 
     pressure: float  # δP at this sample. [Pa]
     plate_pressure: float = 0.0  # At which the plate would stand still now (damping). [Pa]
+    lagged_current: float = 0.0  # That acted on the spool one sample earlier (lateness). [A]
+    delayed_current: float = 0.0  # Of the input, one sample earlier (lateness). [A]
     magnetising_current: float = 0.0  # One sample earlier (hysteresis). [A]
     spool: float = 0.0  # Displacement of the spool one sample earlier (friction). [m]
     deflection: float = 0.0  # Distance by which friction held it back then (friction). [m]
@@ -116,6 +121,8 @@ class PumpState(NamedTuple):
 class PumpSignals(NamedTuple):
     """What is known of the pump at a sample."""
 
+    lagged_current: float  # Current that acts on the spool, behind delay and lag. [A]
+    delayed_current: float  # Current behind the delay alone. [A]
     magnetising_current: float  # Current that the force belongs to, behind the hysteresis. [A]
     solenoid_force: Annotated[float, Definition("net force of both solenoids on the spool", "N")]
     spool_free: float  # Displacement of the spool before its stop. [m]
@@ -206,11 +213,18 @@ def pump_sample(
 ) -> PumpSignals:
     """Everything that is known of the pump at a sample.
 
-    The order is the chain's: hysteresis, force, balance of the spool, friction, opening, rate of
-    the plate, leakage, ripple, line.
+    The order is the chain's: delay and lag, hysteresis, force, balance of the spool, friction,
+    opening, rate of the plate, leakage, ripple, line.
     """
     first_sample = state.initialised == 0.0
+    delayed = inputs.current
     current = inputs.current
+    if options.late is not None:
+        delayed = inputs.delayed_current
+        current = lagged_current(
+            delayed, state.lagged_current, state.delayed_current, p.solenoid_lag, h
+        )
+    lagged = current
     if options.hysteresis is not None:
         current = magnetising_current(current, state.magnetising_current, p.solenoid_hysteresis)
     force = solenoid_force(current, p)
@@ -272,6 +286,8 @@ def pump_sample(
         turned = state.shaft_angle if first_sample else state.shaft_angle + moved
 
     return PumpSignals(
+        lagged_current=lagged,
+        delayed_current=delayed,
         magnetising_current=current,
         solenoid_force=force,
         spool_free=spool,
@@ -317,6 +333,8 @@ def pump_step(
     return PumpState(
         pressure=min(max(free_pressure, limits.lower), limits.upper),
         plate_pressure=min(max(plate_pressure, limits.lower), limits.upper),
+        lagged_current=signals.lagged_current,
+        delayed_current=signals.delayed_current,
         magnetising_current=signals.magnetising_current,
         spool=signals.spool_free,
         deflection=signals.spool_deflection,
@@ -350,6 +368,11 @@ def pump_rates(
     if options.damping is not None:
         plate = plate_pressure_rate(state.pressure, state.plate_pressure, p.swash_damping)
         rising = rising - p.Z6 * plate
+    approaching = 0.0
+    if options.late is not None:
+        approaching = lagged_current_rate(
+            inputs.delayed_current, state.lagged_current, p.solenoid_lag
+        )
     released = 0.0
     if options.friction is not None:
         released = -signals.spool_deflection / p.dither_time
@@ -362,6 +385,8 @@ def pump_rates(
     return PumpState(
         pressure=rising,
         plate_pressure=plate,
+        lagged_current=approaching,
+        delayed_current=0.0,
         magnetising_current=0.0,
         spool=0.0,
         deflection=released,
@@ -380,6 +405,8 @@ def standing(pressure: float, current: float, load_torque: float) -> PumpState:
     return PumpState(
         pressure=pressure,
         plate_pressure=pressure,
+        lagged_current=current,
+        delayed_current=current,
         magnetising_current=current,
         spool=0.0,
         deflection=0.0,
@@ -488,6 +515,7 @@ pump = Model(
     rest=pump_rest,
     settled=pump_settled,
     inputs=PumpInputs,
+    taps={"delayed_current": Tap("current", delay="solenoid_delay")},
     defaults={"pump_speed": "pump_speed", "load_torque": "load_torque", "supply_pressure": "Z9"},
     options=PumpOptions,
     limits=pump_limits,

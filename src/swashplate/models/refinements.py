@@ -1,4 +1,4 @@
-"""What goes beyond Kruse's equations: friction, hysteresis, ripple, damping, leakage, line.
+"""What goes beyond Kruse's equations: friction, hysteresis, lateness, ripple, damping, line.
 
 Each is off unless its option is on (`PumpOptions` of `swashplate.models.displacement_control`).
 docs/refinements.md says what each explains.
@@ -12,6 +12,12 @@ constant T of the dither, which shakes the spool free:
 
 What moves the spool moves it against the friction; a spool that comes to rest is left where
 friction holds it, and goes on to its balance as the dither lets go.
+
+Lateness of the solenoids: the current i acts on the spool after a delay T_d and a lag T_l,
+
+    T_l i_l'(t) = i(t - T_d) - i_l(t).
+
+Solenoid and pilot stage are late, wires and sampling drives too; the ammeter sees nothing of it.
 
 Hysteresis of the solenoids: the force lags behind the current, however slowly it moves.
 
@@ -75,6 +81,61 @@ def held_back(
     dragged = presliding * (deflection * factor) + width * (balance - before)
     unlimited = dragged / (presliding + width)
     return min(max(unlimited, -width), width)
+
+
+@equation
+def left_of_lag(solenoid_lag: float, h: float) -> float:
+    """What a lag leaves of a difference after one step, e^(-h/T_l). [1]"""
+    return exp(-h / solenoid_lag) if solenoid_lag > 0.0 else 0.0
+
+
+@declared(left_of_lag)
+def _left_of_lag(solenoid_lag: float, h: float) -> tuple[float, float]:
+    if solenoid_lag > 0.0:
+        left = exp(-h / solenoid_lag)
+        return left * h / (solenoid_lag * solenoid_lag), -left / solenoid_lag
+    return 0.0, 0.0
+
+
+@equation
+def mean_of_lag(solenoid_lag: float, h: float) -> float:
+    """Mean over one step of what a lag leaves of a difference, (1 - e^(-h/T_l)) T_l/h. [1]"""
+    steps = h / solenoid_lag if solenoid_lag > 0.0 else inf
+    if steps > 0.0:
+        return (1.0 - exp(-steps)) / steps
+    return 1.0
+
+
+@declared(mean_of_lag)
+def _mean_of_lag(solenoid_lag: float, h: float) -> tuple[float, float]:
+    # without a lag it grows with it by 1/h
+    if h <= 0.0:
+        return 0.0, 0.0
+    if solenoid_lag <= 0.0:
+        return 1.0 / h, 0.0
+    left = exp(-h / solenoid_lag)
+    mean = (1.0 - left) * solenoid_lag / h
+    return (mean - left) / solenoid_lag, (left - mean) / h
+
+
+@equation
+def lagged_current(
+    current: float, lagged: float, before: float, solenoid_lag: float, h: float
+) -> float:
+    """Current i_l that acts on the spool one step later. [A]
+
+    Exact for a delayed current that goes straight from `before` to `current` over the step:
+    i_l = e i_l + (m - e) before + (1 - m) current with e and m of `left_of_lag`, `mean_of_lag`.
+    """
+    left = left_of_lag(solenoid_lag, h)
+    mean = mean_of_lag(solenoid_lag, h)
+    return left * lagged + (mean - left) * before + (1.0 - mean) * current
+
+
+@equation
+def lagged_current_rate(current: float, lagged: float, solenoid_lag: float) -> float:
+    """Rate of the current that acts on the spool, (i(t - T_d) - i_l)/T_l; 0 without a lag. [A/s]"""
+    return (current - lagged) / solenoid_lag if solenoid_lag > 0.0 else 0.0
 
 
 @equation

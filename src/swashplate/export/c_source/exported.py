@@ -19,7 +19,7 @@ from swashplate.export.c_source.names import (
 from swashplate.machine import Equation, Model
 from swashplate.machine.code_generation import ascii_name, c_name, fresh_name
 from swashplate.machine.fields import floats_of
-from swashplate.machine.marching import TapOf, taps_of
+from swashplate.machine.marching import TapOf, signals_between, taps_of
 
 
 class ExportedLimit(NamedTuple):
@@ -239,8 +239,19 @@ class Exported:
 
     @cached_property
     def lines(self) -> tuple[str, ...]:
-        """External signals that are kept in delay lines."""
-        return tuple(dict.fromkeys(tap.tap.signal for tap in self.taps))
+        """External signals that are kept in delay lines; those between parts come after them."""
+        return tuple(dict.fromkeys(tap.tap.signal for tap in self.taps if tap.between < 0))
+
+    @cached_property
+    def line_count(self) -> int:
+        """Delay lines of all signals."""
+        return len(self.lines) + len(signals_between(self.model))
+
+    def line_of(self, tap: TapOf) -> int:
+        """Number of the line that a tap reads."""
+        if tap.between < 0:
+            return self.lines.index(tap.tap.signal)
+        return len(self.lines) + tap.between
 
     @property
     def settles(self) -> bool:

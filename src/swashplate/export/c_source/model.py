@@ -33,7 +33,7 @@ from swashplate.machine.code_generation import (
 from swashplate.machine.fields import declared_by, value_at
 from swashplate.machine.graph import names_in
 from swashplate.machine.language import parsed
-from swashplate.machine.marching import CodeForm, SampleCode, output_of
+from swashplate.machine.marching import CodeForm, SampleCode, TapOf, output_of
 from swashplate.machine.model import arguments_of
 
 Array = NDArray[np.float64]
@@ -114,6 +114,12 @@ class Writer:
             self._link_names[name] = function_name
         return f"{self._link_names[name]}(m)"
 
+    def _linked(self, tap: TapOf) -> str:
+        """The signal between parts that a tap reads, at the last sample."""
+        link = self.model.link_of(tap.part, tap.input)
+        assert link is not None
+        return self._link(link)
+
     def _sampled(self) -> str:
         """A sample of each part."""
         return "\n\n".join(part.sample() for part in self.parts)
@@ -124,7 +130,7 @@ class Writer:
         """Declarations of what a part sees through its taps, and their names."""
         lines, names = [], []
         for tap in part.part.taps:
-            line = self.exported.lines.index(tap.tap.signal)
+            line = self.exported.line_of(tap)
             seen = f"read_window(m, {tap.number}, {line}, {tap.tap.samples})"
             text = f"constant_window(m->before_record[{line}])" if constant else seen
             name = fresh_name(f"{part.member}_{c_name(tap.input)}", used_names)
@@ -138,6 +144,10 @@ class Writer:
         used_names = {*self.loops.used_names}
         margins = any(part.part.margin is not None for part in self.parts)
         for part in self.parts:
+            body += [
+                f"m->line[{self.exported.line_of(tap)}][m->newest] = {self._linked(tap)};"
+                for tap in part.part.between
+            ]
             lines, windows = self._windows(part, used_names, constant=False)
             arguments = ["m", f"&m->now.{part.member}", *windows]
             call = f"{part.names['sample']}({', '.join(arguments)})"
@@ -167,8 +177,13 @@ class Writer:
         body: list[str] = []
         used_names = {*self.loops.used_names}
         for index, part in enumerate(self.parts):
+            if settled:
+                body += self._filled(part)
             body.append(f"{part.names[word]}(m);")
             later = "\n".join(texts[index + 1 :])
+            if settled:
+                filled = [line for each in self.parts[index + 1 :] for line in self._filled(each)]
+                later = "\n".join([later, *filled])
             if f"m->{part.member}_signals" in later or f"m->before.{part.member}." in later:
                 lines, windows = self._windows(part, used_names, constant=True)
                 following = fresh_name(f"{part.member}_next", used_names)
@@ -182,6 +197,13 @@ class Writer:
         what = "settled under what it was given" if settled else "at rest"
         head = f"static void {'settled' if settled else 'rested'}_start({self.exported.type} *m)"
         return [*texts, c_function(f"States before the first sample, {what}.", head, body)]
+
+    def _filled(self, part: PartInC) -> list[str]:
+        """Statements that fill the lines of signals between parts with what they are."""
+        return [
+            f"fill_line(m, {self.exported.line_of(tap)}, {self._linked(tap)});"
+            for tap in part.part.between
+        ]
 
     def _updates(self) -> str:
         """What follows from parameters and step: options, constants, places of the taps."""
@@ -202,7 +224,7 @@ class Writer:
                 f"    return {self.P}_UNSTABLE;",
                 "}",
             ]
-        for part_index, _, number, tap in self.exported.taps:
+        for part_index, _, number, tap, _ in self.exported.taps:
             delay = (
                 f"m->{self.exported.members[part_index]}.{path_of(tap.delay)}"
                 if tap.delay
@@ -373,11 +395,17 @@ def feedthrough(exported: Exported, instance: Machine, step: float) -> dict[str,
         signals |= {
             part.tap_samples(tap)[0]: tap.tap.signal
             for tap in part.taps
-            if tap.tap.signal in at_once
+            if tap.between < 0 and tap.tap.signal in at_once
         }
     sources = {
         sample_code.parts[source.part].source(source): node
         for source, node in sample_code.sources.items()
+    }
+    sources |= {
+        part.tap_samples(tap)[0]: part.tapped(tap)
+        for part in sample_code.used
+        for tap in part.between
+        if _is_newest(tap, instance, step)
     }
     inputs_of = {}
     for name, stored in zip(exported.names, observed, strict=True):
@@ -395,12 +423,24 @@ def feedthrough(exported: Exported, instance: Machine, step: float) -> dict[str,
 
 def newest(exported: Exported, instance: Machine, step: float) -> dict[str, tuple[float, float]]:
     """Signals that are read at their newest sample: delay [s], and steps that would be enough."""
+    outside = [tap for tap in exported.taps if tap.between < 0]
     steps = dict[str, float]()
-    for _, _, _, tap in exported.taps:
-        steps[tap.signal] = max(1.0 + tap.ahead, steps.get(tap.signal, 0.0))
-    delay_and_steps = {}
-    for part_index, _, _, tap in exported.taps:
-        delay = float(value_at(instance.parts[part_index].p, tap.delay)) if tap.delay else 0.0
-        if delay < (1.0 + tap.ahead) * step * (1.0 - 1e-12):
-            delay_and_steps[tap.signal] = delay, steps[tap.signal]
-    return delay_and_steps
+    for tapped in outside:
+        signal, enough = tapped.tap.signal, 1.0 + tapped.tap.ahead
+        steps[signal] = max(enough, steps.get(signal, 0.0))
+    return {
+        tapped.tap.signal: (_delay(tapped, instance), steps[tapped.tap.signal])
+        for tapped in outside
+        if _is_newest(tapped, instance, step)
+    }
+
+
+def _delay(tapped: TapOf, instance: Machine) -> float:
+    """Delay of a tap. [s]"""
+    name = tapped.tap.delay
+    return float(value_at(instance.parts[tapped.part].p, name)) if name else 0.0
+
+
+def _is_newest(tapped: TapOf, instance: Machine, step: float) -> bool:
+    """Whether a tap reads the newest sample of its signal."""
+    return _delay(tapped, instance) < (1.0 + tapped.tap.ahead) * step * (1.0 - 1e-12)

@@ -172,11 +172,11 @@ class _Interface:
             f"    struct {exported.prefix}_memory now, before; /* before the last sample */"
         )
         if exported.taps:
-            count, rows = len(exported.taps), len(exported.lines)
+            count, rows = len(exported.taps), exported.line_count
             lines += [
                 f"    int whole[{count}];       /* samples by which taps look back */",
                 f"    double fraction[{count}]; /* and the rest of one */",
-                f"    double line[{rows}][{self.P}_LINE]; /* inputs, a ring for each */",
+                f"    double line[{rows}][{self.P}_LINE]; /* what taps read, a ring for each */",
                 f"    double before_record[{rows}]; /* what they were before the first sample */",
                 "    int newest; /* place of the newest sample */",
             ]
@@ -235,15 +235,11 @@ class _Interface:
 
     def before_all(self) -> str:
         lines = [f"m->inputs.{name} = {name};" for name in self.arguments]
-        for row, signal in enumerate(self.exported.lines):
-            initial = self.exported.arguments.get(signal, "0.0")
-            lines += [
-                f"m->before_record[{row}] = {initial};",
-                f"for (int i = 0; i < {self.P}_LINE; i++) {{",
-                f"    m->line[{row}][i] = {initial};",
-                "}",
-            ]
-        return _body([*lines, *(["m->newest = 0;"] if self.exported.lines else [])] or ["(void)m;"])
+        signals = self.exported.lines
+        initial = [self.exported.arguments.get(signal, "0.0") for signal in signals]
+        initial += ["0.0"] * (self.exported.line_count - len(signals))
+        lines += [f"fill_line(m, {row}, {text});" for row, text in enumerate(initial)]
+        return _body([*lines, *(["m->newest = 0;"] if initial else [])] or ["(void)m;"])
 
     def bounds(self) -> str:
         tests = []
@@ -267,7 +263,7 @@ class _Interface:
         return _body(lines or ["(void)m;"])
 
     def advance_line(self) -> str:
-        if not self.exported.lines:
+        if not self.exported.line_count:
             return ""
         return f"    m->newest = m->newest > 0 ? m->newest - 1 : {self.P}_LINE - 1;\n"
 

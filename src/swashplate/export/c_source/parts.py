@@ -260,13 +260,12 @@ class PartInC:
         c_texts: dict[Node, str] = {}
         named: dict[Node, tuple[str, str]] = {}
         before_record = {
-            signal: f"m->before_record[{row}]" for row, signal in enumerate(layout.exported.lines)
+            tap.input: f"m->before_record[{layout.exported.line_of(tap)}]" for tap in self.part.taps
         }
         for tap, window in zip(self.part.taps, self.windows, strict=True):
             for age, name in enumerate(self.part.tap_samples(tap)):
-                signal = tap.tap.signal
                 c_texts[graph.name(name)] = (
-                    before_record[signal] if start else f"{window}->s[{age}]"
+                    before_record[tap.input] if start else f"{window}->s[{age}]"
                 )
             c_texts[graph.name(self.part.delay_fraction(tap))] = "0.0" if start else f"{window}->f"
         for name in self.part_model.input_types:
@@ -276,13 +275,14 @@ class PartInC:
             default = self.part_model.defaults.get(name)
             if not isinstance(node, Node) or node.op == "number":
                 continue
-            if link is not None:
+            if name in before_record:
+                text = before_record[name] if start else self._looked(node, c_texts)
+            elif link is not None:
                 if link.equation is None:
                     named[node] = c_name(name), layout.place(link.sources[0], "before")
                 continue
-            text = layout.value_of(signal)
-            if name in self.part_model.taps:
-                text = before_record[signal] if start else self._looked(node, c_texts)
+            else:
+                text = layout.value_of(signal)
             if default is not None:
                 is_set = f"m->inputs.measured[{layout.exported.constants['INPUT_'][signal]}].given"
                 text = f"{is_set} ? {text} : p->{path_of(default)}"

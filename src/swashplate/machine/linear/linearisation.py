@@ -60,7 +60,8 @@ def linearize(
     -------
     LinearModel
         Whole samples by which all that is read of the first input is late are its `delay`; other
-        past samples that the model's taps read are states, `memory`.
+        past samples that the model's taps read, those of signals between parts among them, are
+        states, `memory`.
 
     Raises
     ------
@@ -180,14 +181,15 @@ def _linear_model(
             )
     states = state_paths(model)
     n = len(states)
-    samples, slopes = _step_slopes(instance, initial, h, inputs, outputs)
-    of_states = slopes[:n]
-    of_outputs = slopes[n:]
+    step = _step_slopes(instance, initial, h, inputs, outputs)
+    slopes, last = step.slopes, n + len(outputs)
+    of_states, of_outputs, of_between = slopes[:n], slopes[n:last], slopes[last:]
     column_of = {
-        sample: column for column, sample in enumerate(samples, n) if slopes[:, column].any()
+        sample: column for column, sample in enumerate(step.samples, n) if slopes[:, column].any()
     }
     ages = {
-        name: [sample.age for sample in column_of if sample.input == name] or [0] for name in inputs
+        name: [s.age for s in column_of if s.input == name and not s.between] or [0]
+        for name in inputs
     }
     first = {name: min(ages[name]) if name == inputs[0] else 0 for name in inputs}
     past = [
@@ -195,6 +197,9 @@ def _linear_model(
         for name in inputs
         for age in range(first[name] + 1, max(ages[name]) + 1)
     ]
+    for name in step.between:
+        most = max([s.age for s in column_of if s.input == name and s.between], default=0)
+        past += [InputSample(name, age + 1, between=True) for age in range(most)]
     present = [InputSample(name, age) for name, age in first.items()]
     # rows: the model's states, then the past samples; columns: these and the present inputs
     size = n + len(past)
@@ -207,7 +212,14 @@ def _linear_model(
         A[:n, at[sample]] = of_states[:, column]
         C[:, at[sample]] = of_outputs[:, column]
     for sample in past:
-        A[at[sample], at[InputSample(sample.input, sample.age - 1)]] = 1.0
+        newer = sample._replace(age=sample.age - 1)
+        if newer in at:
+            A[at[sample], at[newer]] = 1.0
+            continue
+        now = of_between[step.between.index(sample.input)]
+        A[at[sample], :n] = now[:n]
+        for other, column in column_of.items():
+            A[at[sample], at[other]] = now[column]
     memory = tuple(f"{sample.input}_{sample.age}" for sample in past)
     definitions = model.definitions
     return LinearModel(
@@ -239,11 +251,25 @@ def _check_domain(instance: Machine, initial: InitialStates) -> None:
 
 
 class InputSample(NamedTuple):
-    """A sample of an input that a step reads."""
+    """A sample of an input, or of a signal between parts, that a step reads."""
 
     input: str
     age: int
     """Samples by which it is older than the present one."""
+    between: bool = False
+    """Whether it is one of a signal between parts."""
+
+
+class StepSlopes(NamedTuple):
+    """Derivatives of a step."""
+
+    samples: list[InputSample]
+    """That the step reads of inputs and of signals between parts; of these none as it is now."""
+    slopes: Array
+    """Rows are the model's states after the step, then the outputs, then signals between parts;
+    columns the states before it, then the samples."""
+    between: tuple[str, ...]
+    """Signals between parts of which taps read past samples."""
 
 
 def _step_slopes(
@@ -252,16 +278,12 @@ def _step_slopes(
     h: float,
     inputs: tuple[str, ...],
     outputs: tuple[str, ...],
-) -> tuple[list[InputSample], Array]:
-    """Derivatives of a step of length h [s] at the states that a march would start with.
-
-    Rows are the model's states after the step, then the outputs; columns the states before it, then
-    the samples of the inputs, in the order that is returned with them.
-    """
+) -> StepSlopes:
+    """Derivatives of a step of length h [s] at the states that a march would start with."""
     model = instance.model
     signals = tuple(initial.before)
     stored_outputs = tuple(output_of(model, name)[0] for name in outputs)
-    arguments, program = step_derivatives(
+    arguments, program, between = step_derivatives(
         model, CodeForm(signals, instance.options), stored_outputs
     )
     delays = instance.tap_delays(signals, h)
@@ -272,7 +294,7 @@ def _step_slopes(
         elif stored.kind == "state":
             values.append(float(value_at(initial.states[stored.part], stored.path)))
         else:
-            values.append(instance.number_at(stored, initial.before, h))
+            values.append(instance.number_at(stored, {**initial.before, **initial.between}, h))
     delay_samples = {
         (tap.part, tap.input): int(delays.samples[tap.number]) for tap in taps_of(model, signals)
     }
@@ -283,16 +305,28 @@ def _step_slopes(
             continue
         name, _, sample = path.partition(".")
         age = delay_samples[i, name] + int(sample) if kind == "tap" else 0
-        varied.append(InputSample(model.parts[i].tap(name).signal, age))
+        linked = model.link_of(i, name) is not None
+        varied.append(InputSample(model.parts[i].tap(name).signal, age, linked))
     states = state_paths(model)
+    order = (*inputs, *between)
     samples = sorted(
-        {source for source in varied if isinstance(source, InputSample) and source.input in inputs},
-        key=lambda sample: (inputs.index(sample.input), sample.age),
+        {
+            source
+            for source in varied
+            if isinstance(source, InputSample) and (source.between or source.input in inputs)
+        },
+        key=lambda sample: (sample.between, order.index(sample.input), sample.age),
     )
     column_of = {source: column for column, source in enumerate([*states, *samples])}
-    slopes = np.zeros((len(states) + len(outputs), len(column_of)))
+    slopes = np.zeros((len(states) + len(outputs) + len(between), len(column_of)))
     for source, by_one in zip(varied, program.slopes(values).T, strict=True):
         column = column_of.get(source)
         if column is not None:
             slopes[:, column] += by_one
-    return samples, slopes
+    for number, name in reversed([*enumerate(between)]):  # each follows those before it
+        column = column_of.get(InputSample(name, 0, between=True))
+        if column is not None:
+            by_now = slopes[:, column].copy()
+            slopes[:, column] = 0.0
+            slopes += np.outer(by_now, slopes[len(states) + len(outputs) + number])
+    return StepSlopes(samples, slopes, between)

@@ -17,6 +17,7 @@ from .one_step import step_derivatives as step_derivatives
 from .part_code import PartCode as PartCode
 from .part_code import SignalId as SignalId
 from .part_code import TapOf as TapOf
+from .part_code import signals_between as signals_between
 from .part_code import taps_of as taps_of
 from .record import FASTEST as FASTEST
 from .record import SLOWEST as SLOWEST

@@ -16,7 +16,7 @@ from swashplate.machine.code_generation.machine_code import code_of_text
 from swashplate.machine.declaration import JIT_OFF
 from swashplate.machine.keeping import cached_on_disk, key_of
 from swashplate.machine.marching.interpreting import InterpretedTangents, interpreted_rows
-from swashplate.machine.marching.kernels import FLOATS, KERNEL_KINDS, Struct, pointers
+from swashplate.machine.marching.kernels import FLOATS, INTS, KERNEL_KINDS, Struct, pointers
 from swashplate.machine.marching.observation import ObservedRecord, RunValues
 from swashplate.machine.marching.part_code import SignalId
 from swashplate.machine.marching.rows import (
@@ -41,8 +41,11 @@ from swashplate.machine.marching.tangents import Tangents, padded, tangents_of
 from swashplate.machine.model import Model
 
 Array = NDArray[np.float64]
+Indices = NDArray[np.int64]
 
-TANGENT_KINDS = (*KERNEL_KINDS, *(FLOATS,) * 3)
+OLDEST = 3
+"""Samples that a tap looks back at most beside its delay."""
+TANGENT_KINDS = (*KERNEL_KINDS, *(FLOATS,) * 4, INTS)
 """Kinds of the arguments of a march with derivatives, see `tangents.TANGENT_ARGUMENTS`."""
 
 
@@ -346,7 +349,7 @@ def _march(
     initial = instance.start(first, h, start)
     states = initial_states(instance, initial, run_values.start)
     delays = instance.tap_delays(signals, h)
-    values = tuple(records.values())
+    values = (*records.values(), *(np.empty(observed.record.values.size) for _ in initial.between))
     worst_margin = np.array([np.inf, 0.0])
     places = np.array(row_places, dtype=np.int64)
     offsets = observed.offsets(run_values.offsets)
@@ -358,7 +361,7 @@ def _march(
     if JIT_OFF:
         arrays = arrays_of(instance, values, initial, delays, states, worst_margin, states)
         tangent = begin[:, : len(columns)]
-        simulated = march.interpreted(values[0].size, h, arrays, delays.slope, tangent)
+        simulated = march.interpreted(values[0].size, h, arrays, delays.slope, tangent, start)
         interpreted_rows(plan.fields, numbers, simulated, places, offsets, offset_rows, rows)
         if factor.size:
             factor[:] = np.linalg.qr(rows.T, mode="r")
@@ -395,6 +398,7 @@ def _march(
         delays.slope,
         tangent,
         room,
+        *_ring(sizes, delays.samples, start),
     )
     run, write_rows, absorb = routines()
     struct = Struct(
@@ -412,6 +416,13 @@ def _march(
     run(values[0].size, h, struct.words)
     march.give_back((flat, room, tangent))
     check_domain(instance, states, float(worst_margin[0]), observed.driven_by)
+
+
+def _ring(sizes: Tangents, delay_samples: Indices, start: Start) -> tuple[Array, Indices]:
+    """``past`` and ``ring``, see `tangents.TANGENT_ARGUMENTS`."""
+    samples = 1 << int(delay_samples.max(initial=0) + OLDEST).bit_length()
+    past = aligned(samples * sizes.past) if sizes.past else np.zeros(0)
+    return past, np.array([samples - 1, start == "steady"], dtype=np.int64)
 
 
 # --- a model with numbers, differentiated ---------------------------------------------------------

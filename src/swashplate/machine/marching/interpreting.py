@@ -34,13 +34,18 @@ class _SampleProgram:
         margins = [part.margin for part in sample_code.used if part.margin is not None]
         self.model, self._signals = sample_code.model, sample_code.signals
         self.states, self.margins = len(following), len(margins)
-        results = [*following, *margins, *further]
+        late = [sample_code.parts[tap.part].tapped(tap) for tap in sample_code.late]
+        self._late = [tap.between for tap in sample_code.late]
+        results = [*following, *margins, *further, *late]
         self.arguments = names_of(results, sample_code.stands_for)
         names = [name for name in by if name in self.arguments]
         self.program = program_of(results, names, sample_code.stands_for)
         outside = sample_code.outside()
         self._ids = [outside[name] for name in self.arguments]
         self._taps = {(tap.part, tap.input): tap for tap in taps_of(self.model, self._signals)}
+        self.further = self.states + self.margins
+        self.ends = self.further + len(further)
+        """Where further results begin and end; signals that taps read later come after them."""
 
     def given(self, h: float, arrays: MarchArrays) -> list[float]:
         """What the program takes, as far as it does not change."""
@@ -66,11 +71,35 @@ class _SampleProgram:
             if kind in ("tap", "input"):
                 name, _, age = path.partition(".")
                 tap = self._taps.get((part, name))
-                signal = self._signals.index(self.model.parts[part].tap(name).signal)
+                if tap and tap.between >= 0:
+                    signal = len(self._signals) + tap.between
+                else:
+                    signal = self._signals.index(self.model.parts[part].tap(name).signal)
                 back = int(arrays.delay_samples[tap.number]) + int(age) if tap and age else 0
                 record, before = arrays.records[signal], arrays.before[signal]
                 found.append((place, _reader(record, float(before), back)))
         return found
+
+    def values(
+        self,
+        given: list[float],
+        n: int,
+        arrays: MarchArrays,
+        moving: Sequence[tuple[int, Callable[[int], float]]],
+    ) -> list[float]:
+        """What the program gives at sample n, of which it keeps what taps read later.
+
+        A signal between parts that a tap reads as it is now must be known first: the program runs
+        once for each, and once more.
+        """
+        results: list[float] = []
+        for _ in range(len(self._late) + 1):
+            for place, read in moving:
+                given[place] = read(n)
+            results = self.program.values(given)
+            for between, value in zip(self._late, results[self.ends :], strict=True):
+                arrays.records[len(self._signals) + between][n] = value
+        return results
 
     @property
     def state_places(self) -> list[tuple[int, int]]:
@@ -145,11 +174,9 @@ def marched(
     for n in range(first, first + count):
         for place, number in state_places:
             given[place] = states[number]
-        for place, read in moving:
-            given[place] = read(n)
-        results = sample.program.values(given)
-        margins += results[sample.states : sample.states + sample.margins]
-        keep(n, results[sample.states + sample.margins :], given)
+        results = sample.values(given, n, arrays, moving)
+        margins += results[sample.states : sample.further]
+        keep(n, results[sample.further : sample.ends], given)
         states = [float(state) for state in results[: sample.states]]
     for place, state in zip(places, states, strict=True):
         arrays.states[place] = state
@@ -190,12 +217,24 @@ class InterpretedTangents:
                     by[part.delay_fraction(tap)] = column, tap.number
         self.states = sample_code.carried_ids
         names = [dict(leaves(sample_code.parts[i].state))[path].value for i, _, path in self.states]
-        self._sample = _SampleProgram(sample_code, nodes, [*names, *by])
+        self._past = {
+            name: (tap, age, number)
+            for number, tap in enumerate(sample_code.late)
+            for age, name in enumerate(sample_code.parts[tap.part].tap_samples(tap))
+        }
+        """Of names of past samples their tap, their age, and the number of the signal."""
+        self._sample = _SampleProgram(sample_code, nodes, [*names, *by, *self._past])
         self._state_of = {name: number for number, name in enumerate(names)}
         self._column_of = by
 
     def __call__(
-        self, size: int, h: float, arrays: MarchArrays, delay_slope: Array, tangent: Array
+        self,
+        size: int,
+        h: float,
+        arrays: MarchArrays,
+        delay_slope: Array,
+        tangent: Array,
+        start: str,
     ) -> tuple[Array, Array]:
         """(n, r) outputs, and (n, r, k) derivatives; `tangent` are those of the states, (s, k)."""
         sample, count = self._sample, len(self._outputs)
@@ -203,20 +242,33 @@ class InterpretedTangents:
         derivatives = np.zeros((size, count, tangent.shape[1]))
         moving = tangent.copy()
         by = sample.program.by
+        late = len({number for _, _, number in self._past.values()})
+        lines = np.zeros((late, size, tangent.shape[1]))
+
+        def past(name: str, n: int) -> Array:
+            tap, age, number = self._past[name]
+            at = n - int(arrays.delay_samples[tap.number]) - age
+            counts = at >= 0 or start == "steady"
+            return np.asarray(lines[number, max(at, 0)] if counts else lines[number, 0] * 0.0)
 
         def keep(n: int, numbers: Sequence[float], given: Sequence[float]) -> None:
             nonlocal moving
             values[n] = numbers
             slopes = sample.program.slopes(given)
             total = np.zeros((len(slopes), tangent.shape[1]))
-            for slope, name in zip(slopes.T, by, strict=True):
-                if name in self._state_of:
-                    total += slope[:, None] * moving[self._state_of[name]]
-                else:
-                    column, tap = self._column_of[name]
-                    total[:, column] += slope * (1.0 if tap is None else delay_slope[tap])
+            for _ in range(late + 1):  # what is read as it is now must be known first
+                total[:] = 0.0
+                for slope, name in zip(slopes.T, by, strict=True):
+                    if name in self._state_of:
+                        total += slope[:, None] * moving[self._state_of[name]]
+                    elif name in self._past:
+                        total += slope[:, None] * past(name, n)
+                    else:
+                        column, number = self._column_of[name]
+                        total[:, column] += slope * (1.0 if number is None else delay_slope[number])
+                lines[:, n] = total[sample.ends :]
             moving = total[: sample.states]
-            derivatives[n] = total[sample.states + sample.margins :]
+            derivatives[n] = total[sample.further : sample.ends]
 
         with np.errstate(all="ignore"):  # what is not taken may be infinite
             marched(sample, size, 0, h, arrays, keep)

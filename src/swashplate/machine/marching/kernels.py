@@ -16,10 +16,10 @@ KERNEL_ARGUMENTS = (
 """Arguments of a march.
 
 ``count, first`` samples of the block, and the first of them; ``h`` step; ``records`` a record for
-each signal, ``before`` what it was before; ``delay_samples, delay_fraction`` delays of the taps;
-``params, given`` numbers; ``states`` at the first sample, replaced by those after the last;
-``worst_margin`` the worst margin of the domain so far, and whether everything is kept; ``flat``
-what is kept.
+each signal, then room for each signal between parts that taps read, and ``before`` what these were
+before; ``delay_samples, delay_fraction`` delays of the taps; ``params, given`` numbers; ``states``
+at the first sample, replaced by those after the last; ``worst_margin`` the worst margin of the
+domain so far, and whether everything is kept; ``flat`` what is kept.
 """
 
 

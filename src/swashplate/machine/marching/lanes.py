@@ -27,7 +27,7 @@ from swashplate.machine.keeping import cached_on_disk, key_of
 from swashplate.machine.marching.interpreting import InterpretedMarch
 from swashplate.machine.marching.kernels import FLOATS, INTS, pointers
 from swashplate.machine.marching.march import HALF, ZERO, March, numbers_known
-from swashplate.machine.marching.part_code import SignalId, taps_of
+from swashplate.machine.marching.part_code import SignalId, signals_between, taps_of
 from swashplate.machine.marching.sample_code import CodeForm, SampleCode, output_of
 from swashplate.machine.model import Model
 
@@ -228,6 +228,7 @@ class Lanes:
         # rows an odd number of cache lines apart, so that they do not share places in a cache
         outputs = np.empty((LANES, (size | 15) + 9 if keep else 0))
         values = tuple(map(np.ascontiguousarray, records.values()))
+        values += tuple(np.empty(size * LANES) for _ in signals_between(self._model))
         measured, weight = np.ascontiguousarray(measured), np.ascontiguousarray(weight)
         rest, march = self._functions
         rest(h, params, given, states)
@@ -317,11 +318,13 @@ class Lanes:
         x = SimpleNamespace(**dict(zip(names, others, strict=True)))
         march = InterpretedMarch(self._interpreted, {self._signal: 0}, {})
         before = np.zeros(len(x.records))
+        between = len(signals_between(self._model))
+        records = (*x.records[: len(x.records) - between], *np.empty((between, count)))
         for lane in range(LANES):
             row, margin, state = np.empty(count), np.array([np.inf, 0.0]), x.states[:, lane].copy()
             numbers = (x.delay_samples, x.delay_fraction, x.params, x.given)
             of_lane = (each[:, lane] for each in numbers)
-            march(count, 0, h, x.records, before, *of_lane, state, margin, row)
+            march(count, 0, h, records, before, *of_lane, state, margin, row)
             x.states[:, lane], x.worst[lane] = state, margin[0]
             total = rate = 0.0
             for n, value in enumerate(row.tolist()):

@@ -15,7 +15,7 @@ from swashplate.machine.code_generation.llvm import Code
 from swashplate.machine.code_generation.values import leaves
 from swashplate.machine.graph import Node
 from swashplate.machine.marching.kernels import KERNEL_ARGUMENTS, KERNEL_KINDS
-from swashplate.machine.marching.part_code import PartCode, SignalId
+from swashplate.machine.marching.part_code import PartCode, SignalId, TapOf, signals_between
 from swashplate.machine.marching.sample_code import CodeForm, SampleCode
 from swashplate.machine.model import Model
 
@@ -93,6 +93,11 @@ class March:
             signal: code.load("%records", index, "ptr")
             for index, signal in enumerate(sample_code.signals)
         }
+        first = len(sample_code.signals)
+        self._between = {
+            tap.between: code.load("%records", first + tap.between, "ptr")
+            for tap in sample_code.late
+        }
         self._states = {
             node: code.variable(code.load("%states", place * self._lanes))
             for node, place, _ in self._carried()
@@ -124,7 +129,7 @@ class March:
         for part in sample_code.used if parts is None else parts:
             for node, _, _ in self._carried([part]):
                 known[node] = code.load(self._states[node])
-            known |= self._inputs(part, n)
+            known |= self._inputs(part, n, known)
             for source, node in sample_code.sources.items():
                 if source.part == part.part:
                     (text,) = code.floats([node], known)
@@ -134,17 +139,19 @@ class March:
                 self._take_in(known[graph.plain_value(part.margin)])
         return known
 
-    def _inputs(self, part: PartCode, n: str) -> dict[Node, str]:
-        """What a part reads of records at sample n."""
+    def _inputs(self, part: PartCode, n: str, sources: Mapping[Node, str]) -> dict[Node, str]:
+        """What a part reads of records at sample n; of `sources` it keeps what it reads later."""
         code, sample_code = self.code, self.sample_code
         known, read = dict[Node, str](), sample_code.read(part) | self._names
+        for tap in part.between:
+            if tap in sample_code.late:
+                (text,) = code.floats([part.tapped(tap)], dict(sources))
+                place = code.put(f"mul i64 {n}, {self._lanes}")
+                code.store(text, self._between[tap.between], place)
         for tap in part.taps:
             for age, name in enumerate(part.tap_samples(tap)):
                 if name in read:
-                    places = [
-                        self._past(tap.tap.signal, tap.number, lane, age, n)
-                        for lane in range(self._lanes)
-                    ]
+                    places = [self._past(tap, lane, age, n) for lane in range(self._lanes)]
                     known[graph.name(name)] = code.joined(places)
         for name in part.part_model.input_types:
             signal = part.part_model.tap(name).signal
@@ -153,18 +160,25 @@ class March:
                 known[graph.name(f"x_{signal}")] = code.in_all_lanes(now)
         return known
 
-    def _past(self, signal: str, tap: int, lane: int, age: int, n: str) -> str:
+    def _past(self, tap: TapOf, lane: int, age: int, n: str) -> str:
         """What a signal was some samples before sample n, or before its record."""
-        code = self.code
-        delay = code.load("%delay_samples", tap * self._lanes + lane, "i64")
+        code, signals = self.code, self.sample_code.signals
+        delay = code.load("%delay_samples", tap.number * self._lanes + lane, "i64")
         at = code.put(f"sub i64 {n}, {delay}")
         at = code.put(f"sub i64 {at}, {age}") if age else at
         inside = code.put(f"icmp sge i64 {at}, 0")
         place = code.put(f"select i1 {inside}, i64 {at}, i64 0")
-        value = code.load(self._records[signal], place, "double")
+        if tap.between < 0:
+            record, number = self._records[tap.tap.signal], signals.index(tap.tap.signal)
+        else:
+            record, number = self._between[tap.between], len(signals) + tap.between
+            if code.wide:
+                place = code.put(f"mul i64 {place}, {self._lanes}")
+                place = code.put(f"add i64 {place}, {lane}")
+        value = code.load(record, place, "double")
         before = ZERO
         if not code.wide:
-            before = code.load("%before", self.sample_code.signals.index(signal), "double")
+            before = code.load("%before", number, "double")
         return code.put(f"select i1 {inside}, double {value}, double {before}")
 
     def _take_in(self, margin: str) -> None:
@@ -292,7 +306,8 @@ def step_texts(model: Model, form: CodeForm, stored: Sequence[SignalId]) -> tupl
     code = Code([("ptr", "words")])
     for place, (kind, name) in enumerate(STEP_ARGUMENTS):
         code.named(kind, name, code.load("%words", place, "i64"))
-    records = [code.load("%records", place, "ptr") for place, _ in enumerate(form.signals)]
+    kept = len(form.signals) + len(signals_between(model))
+    records = [code.load("%records", place, "ptr") for place in range(kept)]
     at = code.variable(code.load("%position", 0, "i64"), "i64")
     with code.only_if(code.put(f"icmp eq i64 {code.load(at, 0, 'i64')}, %count")):
         longest = code.load("%position", 1, "i64")
@@ -304,8 +319,8 @@ def step_texts(model: Model, form: CodeForm, stored: Sequence[SignalId]) -> tupl
         code.store(longest, at, 0, "i64")
     first = code.load(at, 0, "i64")
     code.store(code.put(f"add i64 {first}, 1"), "%position", 0, "i64")
-    for place, record in enumerate(records):
-        code.store(code.load("%inputs", place), record, first)
+    for place, _ in enumerate(form.signals):
+        code.store(code.load("%inputs", place), records[place], first)
     known = numbers_known(sample_code, code, sample_code.read)
     for part in sample_code.used:
         for tap in part.taps:

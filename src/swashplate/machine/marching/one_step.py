@@ -15,19 +15,21 @@ from swashplate.machine.model import Model
 
 
 class StepDerivatives(NamedTuple):
-    """Next states of a model, then what is outputs of it, with their derivatives."""
+    """Next states of a model, its outputs, and signals of which taps read past samples, derived."""
 
     arguments: dict[str, SignalId]
     """What the program takes, by name."""
     program: Program
     """Its derivatives are by all states and samples of inputs among the arguments."""
+    between: tuple[str, ...]
+    """Signals between parts of which taps read past samples."""
 
 
 @generating
 def step_derivatives(
     model: Model, form: CodeForm, outputs: tuple[SignalId, ...]
 ) -> StepDerivatives:
-    """A model's next states, then its `outputs`, with their derivatives."""
+    """A model's next states, then its `outputs`, then signals that taps read, derived."""
     return cached_on_disk(
         f"{model.name}_linear",
         (key_of(model), form, outputs),
@@ -43,8 +45,12 @@ def _derived(model: Model, form: CodeForm, outputs: tuple[SignalId, ...]) -> Ste
     for part in sample_code.used:
         results += [node for _, node in leaves(part.following)]
     results += [sample_code.observed(sample_code.parts[signal.part], signal) for signal in outputs]
+    between = dict[str, Node]()
+    for tap in sample_code.late:
+        between[tap.tap.signal] = sample_code.parts[tap.part].tapped(tap)
+    results += between.values()
     outside = sample_code.outside()
     names = names_of(results, sample_code.stands_for)
     moving = [name for name in names if outside[name].kind in ("state", "tap", "input")]
     program = program_of(results, moving, sample_code.stands_for)
-    return StepDerivatives({name: outside[name] for name in names}, program)
+    return StepDerivatives({name: outside[name] for name in names}, program, tuple(between))

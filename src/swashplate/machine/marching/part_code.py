@@ -55,19 +55,37 @@ class TapOf(NamedTuple):
     input: str
     number: int
     tap: Tap
+    between: int = -1
+    """Number of its signal among those between parts that taps read, -1 for one from outside."""
 
 
 @lru_cache(maxsize=256)
 def taps_of(model: Model, signals: tuple[str, ...]) -> tuple[TapOf, ...]:
-    """All taps on signals that are given as records, numbered."""
+    """All taps, numbered: on signals that are given as records, and on signals between parts."""
     taps: list[TapOf] = []
+    between = signals_between(model)
     for index, part in enumerate(model.parts):
         for name in part.input_types:
             tap = part.tap(name)
-            outside = model.link_of(index, name) is None and tap.signal in signals
-            if outside and name in part.taps:
+            if name not in part.taps:
+                continue
+            if model.link_of(index, name) is not None:
+                taps.append(TapOf(index, name, len(taps), tap, between.index(tap.signal)))
+            elif tap.signal in signals:
                 taps.append(TapOf(index, name, len(taps), tap))
     return tuple(taps)
+
+
+@lru_cache(maxsize=256)
+def signals_between(model: Model) -> tuple[str, ...]:
+    """Signals between parts of which taps read past samples: a march keeps them as it goes."""
+    linked = [
+        part.tap(name).signal
+        for index, part in enumerate(model.parts)
+        for name in part.input_types
+        if name in part.taps and model.link_of(index, name) is not None
+    ]
+    return tuple(dict.fromkeys(linked))
 
 
 class PartCode:
@@ -148,12 +166,12 @@ class PartCode:
 
     def _input(self, name: str) -> Value:
         """An input as a name, a window of names, or what a hold makes of one."""
-        link = self.model.link_of(self.part, name)
-        if link is not None:
-            return self._linked(link)
         tap = self.part_model.tap(name)
         record_taps = {tap.input: tap for tap in self.taps}
         record_tap = record_taps.get(name)
+        link = self.model.link_of(self.part, name)
+        if record_tap is None and link is not None:
+            return self._linked(link)
         if record_tap is None:
             if tap.signal in self.records:
                 return graph.name(f"x_{tap.signal}")
@@ -182,6 +200,17 @@ class PartCode:
     def source(self, source: SignalSource) -> str:
         """Name of a signal that another part needs."""
         return f"x_{self.model.parts[source.part].path}_{source.signal}".replace(".", "_")
+
+    def tapped(self, tap: TapOf) -> Node:
+        """The signal between parts that a tap reads, as it is now."""
+        link = self.model.link_of(self.part, tap.input)
+        assert link is not None
+        return self._linked(link)
+
+    @property
+    def between(self) -> list[TapOf]:
+        """Its taps on signals between parts."""
+        return [tap for tap in self.taps if tap.between >= 0]
 
     def tap_samples(self, tap: TapOf) -> list[str]:
         """Names of a tap's samples, newest first."""
@@ -321,7 +350,10 @@ class PartCode:
         """
         part_model = self.part_model
         if start == "steady" and part_model.settled is not None:
-            return self._call(part_model.settled)
+            held = {tap.input: self._held(tap) for tap in self.between}
+            if held and part_model.inputs is not None:
+                held["inputs"] = part_model.inputs(*(self.inputs | held).values())
+            return self._call(part_model.settled, **held)
         if part_model.rest is None:
             first = defaults_of(part_model.state)
             numbers = (first.get(path, 0.0) for path, _ in leaves(self.state))
@@ -338,6 +370,11 @@ class PartCode:
         if part_model.inputs is not None:
             inputs["inputs"] = part_model.inputs(*inputs.values())
         return self._call(part_model.rest, **inputs)
+
+    def _held(self, tap: TapOf) -> Value:
+        """What a tap gives of a signal between parts that does not change."""
+        now = self.tapped(tap)
+        return Window._make(((now,) * tap.tap.width, graph.ZERO)) if tap.tap.width else now
 
 
 def _named(kind: Any, name_of: Callable[[str], str], path: str = "") -> Value:

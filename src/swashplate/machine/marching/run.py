@@ -79,6 +79,8 @@ class InitialStates(NamedTuple):
     """External signals before the record."""
     arguments: tuple[Mapping[str, Any], ...]
     """Of each part what its equations take, by the arguments' names."""
+    between: Mapping[str, float] = MappingProxyType({})
+    """Signals between parts that taps read, before the record."""
 
     @property
     def flat(self) -> Array:
@@ -346,9 +348,9 @@ class Machine:
     ) -> InitialStates:
         """States at the first sample, under the `first` values of the external signals.
 
-        At rest signals that are read through taps were zero before; ``"steady"`` is settled at the
-        first values, which then held before, too. `states` are those of the parts if they are known
-        already.
+        At rest signals that are read through taps were zero before, those between parts, too;
+        ``"steady"`` is settled at the first values, which then held before. `states` are those of
+        the parts if they are known already.
         """
         if states is not None:
             return self._start(first, h, start, states)
@@ -364,6 +366,7 @@ class Machine:
         }
         states: list[Any] = []
         arguments_of_parts: list[Mapping[str, Any]] = []
+        between = dict[str, float]()
         for index, (part, numbers) in enumerate(zip(self.model.parts, self.parts, strict=True)):
             arguments: dict[str, Any] = {
                 "p": numbers.p,
@@ -375,9 +378,10 @@ class Machine:
                 tap = part.tap(name)
                 link = self.model.link_of(index, name)
                 if link is not None:
-                    arguments[name] = linked(
-                        link, states, arguments_of_parts, self.model.replacements
-                    )
+                    value = linked(link, states, arguments_of_parts, self.model.replacements)
+                    if name in part.taps:
+                        value = between[tap.signal] = value if start == "steady" else 0.0
+                    arguments[name] = Window((value,) * tap.width, 0.0) if tap.width else value
                     continue
                 if tap.signal in first:
                     value = (signals_before if name in part.taps else first)[tap.signal]
@@ -399,7 +403,7 @@ class Machine:
                     none = dict.fromkeys(floats_of(part.signals or tuple), math.nan)
                     arguments["signals"] = tuple_from(part.signals or tuple, none)
             arguments_of_parts.append(arguments)
-        return InitialStates(tuple(states), signals_before, tuple(arguments_of_parts))
+        return InitialStates(tuple(states), signals_before, tuple(arguments_of_parts), between)
 
     def _state(self, part: Model, arguments: Mapping[str, Any], start: Start) -> Any:
         equation = part.rest if start == "rest" else part.settled
@@ -591,6 +595,7 @@ def marched(
     worst_margin = np.array([np.inf, float(everything)])
     states = initial_states(instance, initial, begin)
     values = tuple(np.ascontiguousarray(record, dtype=np.float64) for record in records.values())
+    values += tuple(np.empty(size) for _ in initial.between)
     arrays = arrays_of(
         instance,
         values,
@@ -652,11 +657,12 @@ def arrays_of(
 ) -> MarchArrays:
     """What kernels take from ``records`` on (see `kernels.KERNEL_ARGUMENTS`).
 
-    The caller must keep `values` as well: what is made of them are addresses.
+    `values` are the records, then room for the signals between parts that taps read. The caller
+    must keep them as well: what is made of them are addresses.
     """
     return MarchArrays(
         pointers(values),
-        np.array([*initial.before.values()]),
+        np.array([*initial.before.values(), *initial.between.values()]),
         delays.samples,
         delays.fraction,
         instance.params,

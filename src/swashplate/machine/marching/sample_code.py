@@ -14,7 +14,7 @@ from swashplate.machine.code_generation.values import leaves
 from swashplate.machine.fields import floats_of
 from swashplate.machine.graph import Node, names_in
 from swashplate.machine.keeping import cached_on_disk, key_of
-from swashplate.machine.marching.part_code import PartCode, SignalId
+from swashplate.machine.marching.part_code import PartCode, SignalId, TapOf
 from swashplate.machine.model import Model, SignalSource, full_name
 
 
@@ -85,6 +85,8 @@ class SampleCode:
         Of each part the results that are needed, and the paths of the states.
     sources : dict of SignalSource to Node
         Signals that other parts or links need.
+    late : list of TapOf
+        Taps on signals between parts that are read.
     """
 
     def __init__(self, model: Model, form: CodeForm, outputs: Sequence[SignalId]) -> None:
@@ -95,6 +97,7 @@ class SampleCode:
         self.ends: list[list[Node]] = [[] for _ in self.parts]
         self.carried: list[list[str]] = [[] for _ in self.parts]
         self.sources: dict[SignalSource, Node] = {}
+        self.late: list[TapOf] = []
         for output in outputs:
             part = self.parts[output.part]
             if output.kind == "link":
@@ -121,9 +124,15 @@ class SampleCode:
             carried |= new
             ends += [following[path] for path in state if path in new]
         self.carried[part.part] = [path for path in state if path in carried]
+        for tap in part.between:
+            if not read.isdisjoint(part.tap_samples(tap)):
+                self.late.append(tap)
+        late = {tap.input for tap in self.late if tap.part == part.part}
         for name in part.part_model.input_types:
             link = self.model.link_of(part.part, name)
-            if link is not None and any(part.source(source) in read for source in link.sources):
+            if link is None:
+                continue
+            if name in late or any(part.source(source) in read for source in link.sources):
                 self._need(link.sources)
 
     def _need(self, sources: Sequence[SignalSource]) -> None:

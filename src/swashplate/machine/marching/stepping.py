@@ -31,6 +31,7 @@ from swashplate.machine.code_generation.functions import generating
 from swashplate.machine.code_generation.machine_code import address_of, code_of_text
 from swashplate.machine.declaration import JIT_OFF, inlined
 from swashplate.machine.keeping import cached_on_disk, key_of
+from swashplate.machine.marching.derivatives import OLDEST
 from swashplate.machine.marching.interpreting import InterpretedMarch
 from swashplate.machine.marching.kernels import FLOATS, INTS
 from swashplate.machine.marching.march import step_texts
@@ -57,7 +58,7 @@ class StepContext(NamedTuple):
     """Outputs at that sample, filled by the step."""
     states: Array
     lines: Array
-    """Past samples of the inputs, a row each, for the delays."""
+    """Past samples of the inputs, a row each, then of signals between parts, for the delays."""
     position: NDArray[np.int64]
     """Where the next one goes, and how many samples delays look back."""
     records: NDArray[np.int64]
@@ -114,8 +115,6 @@ STEP_ARRAYS = (
 PREPARE_KINDS = ("float", *(FLOATS,) * 4)
 """Kinds of the arguments of `march.PREPARE_ARGUMENTS`."""
 _STEP = CFUNCTYPE(None, c_void_p)
-OLDEST = 3
-"""Samples that a tap looks back at most beside its delay."""
 ROOM = 500
 """Samples that are put behind each other before they are moved."""
 
@@ -158,7 +157,7 @@ class _InterpretedStep:
         if at == context.lines.shape[1]:
             context.lines[:, :longest] = context.lines[:, at - longest :]
             at = longest
-        context.lines[:, at] = context.inputs
+        context.lines[: context.inputs.size, at] = context.inputs
         context.position[0] = at + 1
         margin = np.array([np.inf, 0.0])
         self._march(
@@ -245,17 +244,17 @@ class CompiledStep:
         constants = np.zeros(self._count)
         self._prepare(self._h, delays.fraction, instance.params, instance.given, constants)
         longest = int(delays.samples.max(initial=0)) + OLDEST
-        lines = np.zeros((len(self.inputs), longest + ROOM))
-        if start == "steady":
-            lines[:] = newest[:, None]
+        initial = instance.start(values, self._h, start)
+        before = np.array([*initial.before.values(), *initial.between.values()])
+        lines = np.tile(before[:, None], longest + ROOM)
         return StepContext(
             inputs=newest,
             outputs=np.zeros(len(self.outputs)),
-            states=instance.start(values, self._h, start).flat,
+            states=initial.flat,
             lines=lines,
             position=np.array([longest, longest]),
             records=_rows_of(lines),
-            before=np.zeros(len(self.inputs)),
+            before=np.zeros(len(before)),
             delay_samples=delays.samples,
             delay_fraction=delays.fraction,
             params=instance.params,

@@ -41,12 +41,17 @@ QUICK = {*graph.CHEAP, "**", "call"}
 """Operations that are computed again rather than kept; what a call returns is kept."""
 VECTOR = f"<{SIDE_BY_SIDE} x double>"
 MINUS_ONE = graph.number(-1.0)
-TANGENT_ARGUMENTS = (*ARGUMENTS, ("ptr", "delay_slope"), ("ptr", "tangent"), ("ptr", "room"))
+TANGENT_ARGUMENTS = (
+    *ARGUMENTS,
+    *(("ptr", name) for name in ("delay_slope", "tangent", "room", "past", "ring")),
+)
 """Of a march with derivatives: what a march takes, with rows of values and columns in ``flat``.
 
 ``delay_slope`` samples that each delay grows by a second; ``tangent`` derivatives of the states at
 the first sample, replaced by those after the last, then memory of integrals; ``room`` what the
-march leaves for the columns, zeros at first.
+march leaves for the columns, zeros at first; ``past`` derivatives of the signals between parts
+that taps read, a ring for each; ``ring`` its samples, a power of 2, less 1, and whether the first
+sample's derivatives are those before it, too, as in a steady start: else they are zero.
 """
 
 
@@ -67,6 +72,8 @@ class Tangents(NamedTuple):
     """Columns of a state or an output, idle ones counted."""
     tangents: int
     """Numbers of ``tangent``."""
+    past: int
+    """Numbers of a sample in ``past``."""
     states: tuple[SignalId, ...]
     """States in the order in which ``tangent`` has them, `width` numbers each."""
 
@@ -96,6 +103,10 @@ class Carried:
         States, and what they become.
     outputs : list of Node
         The signals.
+    past : dict of Node to tuple
+        Of each past sample of a signal between parts its tap, its age, and the signal's number.
+    between : list of Node
+        Those signals now.
     vertices : list of Node
         What carries derivatives, each after what it follows.
     flows : dict of Node to dict of Node to Contribution
@@ -138,16 +149,25 @@ class Carried:
         self.outputs = [
             sample_code.observed(sample_code.parts[signal.part], signal) for signal in outputs
         ]
+        late = sample_code.late
+        self.between = [sample_code.parts[tap.part].tapped(tap) for tap in late]
+        self.past = {
+            graph.name(name): (tap, age, number)
+            for number, tap in enumerate(late)
+            for age, name in enumerate(sample_code.parts[tap.part].tap_samples(tap))
+        }
+        self.moving |= {*self.past}
+        results = [*self.following, *self.outputs, *self.between]
         elimination = Elimination(
-            [*self.following, *self.outputs],
-            self.states,
+            results,
+            [*self.states, *self.past],
             [*column_of],
             len(columns),
             sample_code.stands_for,
         )
         self.flows: dict[Node, dict[Node, Contribution]] = {}
         self.direct: dict[Node, dict[int, Node]] = {}
-        for column in dict.fromkeys([*self.following, *self.outputs]):
+        for column in dict.fromkeys(results):
             if column in column_of:  # a parameter itself
                 self.flows[column], self.direct[column] = {}, {column_of[column]: ONE}
         for vertex, edges in elimination.edges.items():
@@ -161,7 +181,7 @@ class Carried:
                 number = column_of[operand]
                 direct[number] = graph.plus(direct.get(number, ZERO), amount)
         self._find_groups(begins)
-        self.vertices = [vertex for vertex in self.flows if self.groups[vertex]]
+        self.vertices = [vertex for vertex in self._in_order() if self.groups[vertex]]
 
     def _find_groups(self, begins: Mapping[SignalId, Any]) -> None:
         """Find out which columns reach which states and vertices."""
@@ -171,6 +191,8 @@ class Carried:
         }
         for vertex, direct in self.direct.items():
             self.groups[vertex] = {number // SIDE_BY_SIDE for number in direct}
+        for node in self.past:
+            self.groups[node] = set()
         before = -1
         while before != (now := sum(map(len, self.groups.values()))):
             before = now
@@ -179,6 +201,20 @@ class Carried:
                     self.groups[vertex] |= self.groups.get(operand, set())
             for state, following in zip(self.states, self.following, strict=True):
                 self.groups[state] |= self.groups.get(following, set())
+            for node, (_, _, number) in self.past.items():
+                self.groups[node] |= self.groups.get(self.between[number], set())
+
+    def _in_order(self) -> list[Node]:
+        """All vertices; a signal between parts comes before what reads it through a tap."""
+
+        def followed(node: Node) -> list[Node]:
+            if node in self.past:
+                return [self.between[self.past[node][2]]]
+            return [*self.flows.get(node, ())]
+
+        if not self.past:
+            return [*self.flows]
+        return [node for node in ordered([*self.flows], operands=followed) if node in self.flows]
 
 
 def delay_slope(tap: int) -> Node:
@@ -293,6 +329,7 @@ class _Block:
             first_column=self.first_column,
             width=self.width,
             tangents=self._first_integral + 2 * integrals * (SIDE_BY_SIDE + self.width),
+            past=len(self.carried.between) * self.width,
             states=tuple(self.carried.ids),
         )
 
@@ -407,7 +444,11 @@ class _Block:
             now = {state: code.load(variable, 0, VECTOR) for state, variable in variables.items()}
             for vertex in carried.vertices:
                 if group in carried.groups[vertex]:
+                    for node in carried.flows[vertex]:
+                        if node not in now and group in carried.groups.get(node, ()):
+                            now[node] = self._past(code, node, at, group)
                     now[vertex] = sample.sum_of(vertex, now)
+                    self._keep(code, vertex, now[vertex], at, group)
             for state, variable in variables.items():
                 text = now.get(following[state], "zeroinitializer")
                 code.store(text, variable, 0, VECTOR)
@@ -423,6 +464,31 @@ class _Block:
                     code.store(text, "%flat", _place(code, at, self.row, place), VECTOR)
         for state, place in places.items():
             code.store(code.load(variables[state], 0, VECTOR), "%tangent", place, VECTOR)
+
+    def _past(self, code: Code, node: Node, at: str, group: int) -> str:
+        """Derivatives of a past sample of a signal between parts by a group of columns."""
+        tap, age, number = self.carried.past[node]
+        n = code.put(f"add i64 %first, {at}")
+        delay = code.load("%delay_samples", tap.number, "i64")
+        n = code.put(f"sub i64 {code.put(f'sub i64 {n}, {delay}')}, {age}")
+        inside = code.put(f"icmp sge i64 {n}, 0")
+        n = code.put(f"select i1 {inside}, i64 {n}, i64 0")
+        steady = code.put(f"icmp ne i64 {code.load('%ring', 1, 'i64')}, 0")
+        counts = code.put(f"or i1 {inside}, {steady}")
+        vector = code.load("%past", self._place_in_ring(code, n, number, group), VECTOR)
+        return code.put(f"select i1 {counts}, {VECTOR} {vector}, {VECTOR} zeroinitializer")
+
+    def _keep(self, code: Code, vertex: Node, vector: str, at: str, group: int) -> None:
+        """Keep derivatives of a signal between parts."""
+        for number, node in enumerate(self.carried.between):
+            if node is vertex:
+                n = code.put(f"add i64 %first, {at}")
+                code.store(vector, "%past", self._place_in_ring(code, n, number, group), VECTOR)
+
+    def _place_in_ring(self, code: Code, n: str, number: int, group: int) -> str:
+        slot = code.put(f"and i64 {n}, {code.load('%ring', 0, 'i64')}")
+        row = code.put(f"mul i64 {slot}, {len(self.carried.between) * self.width}")
+        return code.put(f"add i64 {row}, {number * self.width + group * SIDE_BY_SIDE}")
 
 
 class _Sample:
