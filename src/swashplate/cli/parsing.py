@@ -16,8 +16,8 @@ from swashplate.units import unit_text
 if TYPE_CHECKING:
     from swashplate.analysis import FactorRange
     from swashplate.campaign import Campaign, Experiment
-    from swashplate.drive import Drive
-    from swashplate.identification import FitSetup, ModelSetup, Verdict
+    from swashplate.drive import Drive, KeyNumbers
+    from swashplate.identification import FitSetup, ModelSetup, StoredVerdict, Verdict
     from swashplate.logs import TextOptions
     from swashplate.parameters import Change, Parameter, ParameterSet
 
@@ -223,6 +223,20 @@ def verdict_of_fit(word: str, numbers: Mapping[str, float]) -> Verdict | None:
 
     None if there is no such fit, or if these numbers are not its own.
     """
+    stored = _stored_with_fit(word, numbers)
+    return None if stored is None else stored.verdict
+
+
+def key_numbers_of(word: str, drive: Drive) -> KeyNumbers:
+    """The numbers that matter of a drive, with intervals if it is that of the named fit."""
+    from swashplate.analysis import key_numbers
+
+    stored = _stored_with_fit(word, drive.parameters.numbers)
+    return (stored and stored.key_numbers) or key_numbers(drive)
+
+
+def _stored_with_fit(word: str, numbers: Mapping[str, float]) -> StoredVerdict | None:
+    """What the fit whose folder, or a file in it, is named says of a drive of these numbers."""
     from swashplate.identification import read_verdict
 
     place = Path(word) if Path(word).is_dir() else Path(word).parent
@@ -233,7 +247,7 @@ def verdict_of_fit(word: str, numbers: Mapping[str, float]) -> Verdict | None:
         return None
     if stored is None or stored.numbers != dict(numbers):
         return None
-    return stored.verdict
+    return stored
 
 
 # --- changes and design variables -----------------------------------------------------------------

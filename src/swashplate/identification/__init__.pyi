@@ -1,7 +1,10 @@
 from .assessment import Identification as Identification
+from .assessment import StoredVerdict as StoredVerdict
+from .assessment import logged_command as logged_command
 from .assessment import motion_of as motion_of
 from .assessment import parts_of as parts_of
 from .assessment import read_verdict as read_verdict
+from .assessment import tested_commands as tested_commands
 from .assessment import versions as versions
 from .diagnostics.verdict import Verdict as Verdict
 from .diagnostics.verdict import assess_fit as assess_fit
