@@ -1,6 +1,7 @@
 """One answer for the numbers that matter: whatever shows them shows the same text."""
 
 import re
+import tomllib
 from collections.abc import Callable
 from dataclasses import replace
 from html import unescape
@@ -10,6 +11,7 @@ import pytest
 from tests.cli.conftest import stages
 
 from swashplate import Drive, analysis
+from swashplate.cli import parsing
 from swashplate.identification import Identification
 from swashplate.parameters import LoggedCommand
 
@@ -114,7 +116,7 @@ def test_every_output_shows_the_same_numbers(done, run, logs, tmp_path, case) ->
     shown["validation"] = in_page((tmp_path / "v" / "report.html").read_text("utf-8"))
     shown["summary"] = in_lines(judged.summary())
     shown["compare"] = in_lines(done("compare", "fitted", "hoist"))[:1]
-    assert shown == dict.fromkeys(shown, [expected])
+    assert shown == {name: [expected] for name in shown}
     # what limits it and what to change first, too
     first = judged.key_numbers.change_first
     words = f"Change first: {first.component}."
@@ -149,3 +151,24 @@ def test_numbers_are_of_the_stick_s_own_volts(hoist: Drive) -> None:
     assert "'Joystick'" in said
     assert "5 V at rest" in said
     assert "4 and -3 V" in said
+
+
+def test_a_creep_that_may_be_none_is_in_no_table_of_a_controller(
+    done, number, tmp_path, monkeypatch
+) -> None:
+    """The hoist creeps by 3.09 deg/s; what is not told from none is not compensated."""
+    Drive.preset("hoist").to_toml(tmp_path / "winch.toml")
+    numbers = analysis.key_numbers(Drive.preset("hoist"))
+    creep = numbers["creep"]
+    for half, taken in ((1.5, 0.0), (0.5, creep.value)):
+        found = creep._replace(
+            lower=creep.value * (1.0 - half), upper=creep.value * (1.0 + half), note=""
+        )
+        others = tuple(each for each in numbers.numbers if each.name != "creep")
+        given = replace(numbers, numbers=(*others, found))
+        monkeypatch.setattr(parsing, "key_numbers_of", lambda *_, given=given: given)
+        said = done("compensate", "winch.toml", "--out", "map.toml", "--force")
+        written = tomllib.loads((tmp_path / "map.toml").read_text("utf-8"))
+        assert written["rest"]["speed"] == pytest.approx(taken, abs=1e-12)
+        assert ("The map takes it as none" in said) == (half > 1.0)
+    assert numbers["creep"].text() == f"{creep.value:.4g}"

@@ -473,8 +473,10 @@ def compensate(
             f"--speed-deg-s {stick}."
         )
     with spinner("Inverting"):
+        numbers = parsing.key_numbers_of(drive.drive, drive.loaded_drive)
         marched = trials.at_rate(drive.loaded_drive, sampling.rate)
-        inverse = analysis.inverse_map(marched, points)
+        creeping = not any(number.unseen for number in numbers.numbers if number.name == "creep")
+        inverse = analysis.inverse_map(marched if creeping else marched.replace(Z18=0.0), points)
         improvement = None
         tables = inverse.tables([radians(speed) for speed in speeds_deg_s or ()])
         if stick is not None:
@@ -485,6 +487,8 @@ def compensate(
     save(out, "Inverse map, in SI", inverse.write)
     draw_figure(plot, "plot_compensation", inverse, improvement)
     drive.note(f"{drive.title}: voltage for a required speed")
+    if not creeping:
+        note(f"Creep at rest: {numbers['creep'].shown}. The map takes it as none (Z18 = 0).")
     if inverse.logged is not None:
         note(f"{inverse.logged.sentence}; the tables give both.")
     show(*tables)

@@ -81,6 +81,12 @@ class KeyNumber(NamedTuple):
             return False
         return self.lower <= 0.0 <= self.upper
 
+    @property
+    def shown(self) -> str:
+        """The number with its unit, as its row of the table has it."""
+        unit = display_unit(self.unit, abs(self.value or 0.0) or float("inf"))
+        return f"{self.text(unit.factor)} {unit.name}"
+
     def text(self, factor: float = 1.0) -> str:
         """The number as it is shown, times a factor: with its interval, or as an end."""
         if self.value is None:
