@@ -321,11 +321,15 @@ class KeyNumbers(Tabular):
 # --- the stick ------------------------------------------------------------------------------------
 
 
+LONGEST = 12
+"""Characters of a column's name that may stand in the place of a unit."""
+
+
 def command_unit(stick: LoggedCommand | None) -> str:
     """Unit of a command as logs hold it: V, or the column's name if it is scaled from another."""
     if stick is None or stick.scale == 1.0 or not stick.unit:
         return "V"
-    return f"'{stick.column}'"
+    return f"'{stick.column}'" if len(stick.column) <= LONGEST else "logged"
 
 
 def quantity_at_rest(stick: LoggedCommand) -> str:

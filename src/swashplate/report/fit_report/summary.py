@@ -178,7 +178,7 @@ def _next_steps(
             plus, minus = tested_commands(run for run in stages[0].problem.experiments) or FULL
             volts = plus or -minus
             code = Markup("Try it in the folder of the fit: <code>{}</code>.")
-            step = f"step:{volts:.2g}"  # to more digits it is noise of the log
+            step = f"step:{volts:g}"
             steps.append(code.format(f"swashplate simulate {FITTED_DRIVE} {step}"))
     return steps
 
