@@ -290,8 +290,13 @@ def test_a_verdict_is_the_first_that_is_read(work: Work) -> None:
         assert all(f"<dd>{escape(answer)}</dd>" in html for answer in answers.values())
         assert html.count(escape(verdict.headline)) == 1
         assert len(repr(result)) <= LONGEST + 40
-    # estimates, then how far predictions may be off; what they rest on is there to be opened
+    # numbers that matter, estimates, then how far predictions may be off; what they rest on can be
+    # opened
     before, _, after = html.partition("<details>")
+    numbers = work.judged.key_numbers
+    assert numbers is not None
+    assert before.index(numbers.table()._repr_html_()) < before.index("Stage card")
+    assert str(numbers.table()) in work.judged.summary()
     assert work.fitted.stages[-1].problem.unknowns.names[0] in before
     stated = before.index(verdict.table().title)
     assert before.index("Stage card") < before.index("Stage pump") < stated

@@ -15,7 +15,6 @@ from swashplate.analysis import (
     bands,
     drawn_drives,
     find_outcomes,
-    standard_errors,
     stored_draws,
     trial_of,
 )
@@ -40,7 +39,10 @@ VOLTAGE = maneuvers.step(9.0, stop=4.0, length=5.0).sample()
 @pytest.fixture
 def given_uncertainty(monkeypatch: pytest.MonkeyPatch) -> None:
     """Stages of which the Monte Carlo takes an uncertainty that the test gives."""
-    monkeypatch.setattr("swashplate.analysis.monte_carlo.uncertainty_of", attrgetter("uncertainty"))
+    for module in ("monte_carlo", "propagation"):
+        monkeypatch.setattr(
+            f"swashplate.analysis.{module}.uncertainty_of", attrgetter("uncertainty")
+        )
 
 
 @pytest.mark.slow
@@ -82,8 +84,7 @@ def test_draws_outside_the_bounds_are_drawn_again(hoist):
 
 
 @pytest.mark.usefixtures("given_uncertainty")
-def test_standard_errors_where_no_draw_stays_within_the_bounds(hoist):
-    """Of a pump that is hardly known, at its lower bound: the speed goes with it, the time not."""
+def test_no_draws_of_a_pump_that_is_hardly_known_at_its_bound(hoist):
     unknowns = Unknowns((Unknown("Z10", 12.396, 12.396, 24.0),))
     own = SimpleNamespace(matrix=np.diag([1e4]), determined=np.array([True]))
     stage = SimpleNamespace(
@@ -96,13 +97,6 @@ def test_standard_errors_where_no_draw_stays_within_the_bounds(hoist):
         drive=hoist,
     )
 
-    def numbers(drive: Drive) -> np.ndarray:
-        return np.array([float(drive.steady_speed(10.0)), drive.parameters.numbers["tau"]])
-
-    speed, delay = standard_errors([stage], numbers)
-    without_creep = hoist.parameters.numbers["Z10"] * hoist.parameters.numbers["Z13_plus"]
-    assert speed == pytest.approx(100.0 * without_creep, rel=1e-6)
-    assert delay == 0.0
     with pytest.raises(InputError, match=r"Of \d+ draws .*Monte Carlo"):
         drawn_drives([stage], 10)
 

@@ -29,8 +29,8 @@ def test_the_envelope(done, number):
     assert [number(text, "speed limit", k) for k in range(2)] == pytest.approx(
         [196, -185], abs=0.05
     )
-    assert number(text, "creep at 0 V") == pytest.approx(3.09, abs=0.005)
-    assert "gain, mean" in done("limits", "hoist", "--set", "Z17=5")  # which does not move
+    assert number(text, "Creep at rest") == pytest.approx(3.09, abs=0.005)
+    assert "Top speed" in done("limits", "hoist", "--set", "Z17=5")  # which does not move
 
 
 def test_what_to_change_first(done, number):

@@ -155,7 +155,7 @@ def test_a_drive_in_a_file_is_a_drive(done, own):
         for word in ("own_tank.py:winch", "winch.toml")
     )
     assert by_name[1:] == by_file[1:]
-    assert "gain, mean" in done("limits", "own_tank.py:winch")
+    assert "Gain beyond it" in done("limits", "own_tank.py:winch")
 
 
 def test_the_folder_of_a_fit_has_its_numbers(done, refused, own, tmp_path):

@@ -40,6 +40,20 @@ def test_ignored_samples_do_not_count() -> None:
     assert found.rmse == pytest.approx(np.sqrt(2.0 / 3.0))
 
 
+def test_a_channel_that_rests_has_no_fit(hoist: Drive) -> None:
+    """Noise of an idle solenoid is no failure; a signal that moves where none should is one."""
+    command = np.linspace(0.0, 5.0, 2000)
+    noise = 1e-3 * np.random.default_rng(5).standard_normal(2000)
+    still = np.zeros(2000)
+    run = run_of("ramp", command, {"shaft_speed": noise})
+    idle = compared(run, "shaft_speed", still).measures
+    assert (idle.nrmse, idle.fit_percent) == (None, None)
+    assert idle.rmse == pytest.approx(noise.std(), rel=0.01)
+    for measured, simulated in ((noise + 1e-2 * command, still), (noise, 1e-2 * command)):
+        run = run_of("ramp", command, {"shaft_speed": measured})
+        assert compared(run, "shaft_speed", simulated).measures.fit_percent < 50.0
+
+
 @pytest.mark.parametrize(("level", "count"), [(0.0, 7), (0.1, 7), (1e6 / 3.0, 7), (3.0, 1)])
 def test_a_constant_has_no_fit(level: float, count: int) -> None:
     found = measures((np.full(count, level), np.full(count, level) + 1.0, None))

@@ -26,6 +26,7 @@ from swashplate import (
     InputError,
     Machine,
     Model,
+    analysis,
     discretised,
     equation,
     maneuvers,
@@ -61,7 +62,6 @@ from swashplate.report.fit_report import (
 )
 from swashplate.report.fit_report.live import SPAN
 from swashplate.report.fit_report.runs import packed_samples, run_data
-from swashplate.report.fit_report.summary import largest_commands, numbers_table
 
 HOSTILE = "</script><img src=x onerror=alert(1)>"
 
@@ -371,30 +371,33 @@ def test_truth_stands_beside_the_estimates(write, judged: Identification, read: 
 def test_a_number_of_fixed_parameters_alone_says_so(campaign: Campaign) -> None:
     still = Drive.preset("hoist").replace(Z11=0.0, Z18=0.0)
     found = fit(still, campaign.select(role="fit"), SETUP)
-    table, _ = numbers_table(found.drive, found.stages)
-    rows = {line.strip().split("  ")[0]: line for line in str(table).splitlines()}
-    assert "0 (fixed)" in rows["Creep at 0 V"]
-    (top,) = (words for quantity, words in rows.items() if quantity.startswith("Top speed"))
-    assert "±" in top
+    numbers = analysis.key_numbers(found)
+    assert numbers["creep"].text() == "0 (not seen)"
+    # the dead zone is that of V_dz, Z17 and the jump
+    assert numbers["dead_zone_minus"].note == "fixed"
+    assert "±" in numbers["top_speed_plus"].text()
 
 
 def test_the_first_screen_is_for_the_owner(read: Page, fitted: Fit, validated: Path) -> None:
     rows = {row["quantity"]: row for row in read.rows("numbers")}
     drive = fitted.drive
-    (top,) = (row for name, row in rows.items() if name.startswith("Top speed at "))
-    plus, minus = largest_commands(fitted.stages)
+    top, dead_zone = rows["Top speed"], rows["Dead zone"]
+    plus, minus = analysis.key_numbers(fitted).commands
+    commands = [run.input.values for run in fitted.runs]
+    assert plus == pytest.approx(max(volts.max() for volts in commands), abs=0.005)
+    assert minus == pytest.approx(-min(volts.min() for volts in commands), abs=0.005)
     assert top["unit"] == "deg/s"
     for way, head in ((plus, "positive"), (-minus, "negative")):
         settled = np.degrees(drive.simulate(np.full(8192, way), 512.0).shaft_speed[-1])
         assert number(top[head]) == pytest.approx(settled, rel=2e-3)
         # no force acts at the edge of the dead zone, and one does beyond it
-        volts = number(rows["Dead zone, up to"][head])
+        volts = number(dead_zone[head])
         inside, outside = drive.steady_current(np.array([0.99 * volts, 1.01 * volts]))
         dead = drive.parameters.numbers["Z17"]
         assert abs(float(inside)) <= dead < abs(float(outside))
-    assert "±" in rows["Dead zone, up to"]["positive"]
+    assert "±" in dead_zone["positive"]
     # the hoist creeps, and Z10 was fitted
-    assert "±" in rows["Creep at 0 V"]["positive"]
+    assert "±" in rows["Creep at rest"]["positive"]
     # a drive alone has no intervals
     assert "±" not in Page(validated.read_text("utf-8")).rows("numbers")[0]["positive"]
     assert "The held-out run" in read.words

@@ -2,6 +2,7 @@
 
 import tomllib
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from math import inf
 from pathlib import Path
 from types import MappingProxyType
@@ -11,19 +12,18 @@ import pytest
 from tests.identification.given import run_of
 
 from swashplate import Drive, Experiment, maneuvers
-from swashplate.analysis import envelope, standard_errors, variances_from_bounds
-from swashplate.drafting import guess_drive, guess_table, guessed_fit_setup, guessed_set
+from swashplate.analysis import envelope, key_numbers
+from swashplate.analysis.propagation import spread_of
+from swashplate.drafting import guess_drive, guessed_fit_setup, guessed_set
 from swashplate.identification import Fit, FitSetup, assess_fit, fit, identifiability_of, predict
 from swashplate.identification.estimation.setup import Free
-from swashplate.report.fit_report.summary import largest_commands, machine_numbers_of, numbers_table
-from swashplate.tables import Cell
 
 NEUTRAL = Drive.preset("neutral")
 OPENING = 6e-5
 """Of the winch's orifices: about a sixth of what a step to 8 V asks for. [m]"""
 WINCH = NEUTRAL.replace(V_dz=(0.8, 0.6), tau=0.04, Z8=1.4e6, Z16=(OPENING, OPENING))
 """No stop within ±10 V; a lag of 0.15 s, accelerations limited both ways."""
-ROWS = {"dead zone": 0, "top speed": 1, "acceleration": 2, "delay": 3, "lag": 4, "creep": 5}
+WAYS = ("plus", "minus")
 
 
 def measured(drive: Drive) -> list[Experiment]:
@@ -64,18 +64,14 @@ def fitted(
     return fit(start, runs, setup, threads=1)
 
 
-def cells(result: Fit) -> list[list[str]]:
-    """Texts of the table, positive and negative, by its rows."""
-    table, _ = numbers_table(result.drive, result.stages)
-    return [
-        [cell.text if isinstance(cell, Cell) else str(cell) for cell in row.cells[1:3]]
-        for row in table.rows
-    ]
+def texts(result: Fit) -> dict[str, str]:
+    """Each number as it is shown, in SI, by its name with the direction."""
+    return {number.label: number.text() for number in key_numbers(result).numbers}
 
 
-def interval(text: str) -> tuple[float, float]:
-    value, half = map(float, text.split("±"))
-    return value - half, value + half
+def with_tests(drive: Drive) -> Drive:
+    """A drive that knows how far its tests went."""
+    return Drive(replace(drive.parameters, tested=(8.0, 7.0)))
 
 
 @pytest.fixture(scope="module")
@@ -90,28 +86,30 @@ def found(runs: list[Experiment]) -> Fit:
 
 @pytest.mark.slow
 def test_numbers_of_what_was_tested_hold(found: Fit) -> None:
-    shown, largest = cells(found), largest_commands(found.stages)
-    assert largest == (8.0, 7.0)
-    truth = machine_numbers_of(WINCH, largest)
-    degrees = {"acceleration": 180.0 / np.pi}
-    for name in ("dead zone", "acceleration", "delay", "lag"):
-        row = ROWS[name]
-        for way in (0, 1):
-            low, high = interval(shown[row][way])
-            # 1.5 times the interval: eight of them at 95 % each
-            slack = 0.25 * (high - low)
-            assert low - slack <= degrees.get(name, 1.0) * truth[row, way] <= high + slack, name
+    numbers, truth = key_numbers(found), key_numbers(with_tests(WINCH))
+    assert numbers.commands == truth.commands == (8.0, 7.0)
+    for number in numbers.numbers:
+        if number.name in ("jump", "creep"):  # the winch has none
+            assert (number.value, number.note) == (0.0, "not seen")
+            continue
+        low, high = number.interval
+        assert low is not None
+        assert high is not None
+        # 1.5 times the interval: twelve of them at 95 % each
+        slack, true = 0.25 * (high - low), truth[number.label].value
+        assert low - slack <= true <= high + slack, number.label
 
 
 @pytest.mark.slow
 def test_the_top_speed_is_that_of_the_largest_command_that_was_tested(found: Fit) -> None:
     """Of a stick that ends there, one at 10 V would be nobody's."""
-    shown = cells(found)[ROWS["top speed"]]
-    for text, volts in zip(shown, (8.0, -7.0), strict=True):
-        low, high = interval(text)
-        seen = np.degrees(float(WINCH.steady_speed(volts)))
+    numbers = key_numbers(found)
+    for way, volts in zip(WAYS, (8.0, -7.0), strict=True):
+        low, high = numbers[f"top_speed_{way}"].interval
+        seen = float(WINCH.steady_speed(volts))
         slack = 0.25 * (high - low)
         assert low - slack <= seen <= high + slack
+    assert "at 8 and -7 V" in str(numbers.table())
 
 
 @pytest.mark.slow
@@ -119,53 +117,61 @@ def test_an_orifice_that_the_fit_does_not_look_for_leaves_no_interval(
     runs: list[Experiment],
 ) -> None:
     """A lag stands for it, and the lag is the same both ways."""
-    shown = cells(fitted(runs, without=["Z16_minus"]))
-    assert "±" not in shown[ROWS["acceleration"]][1]
-    assert "Z16_minus fixed" in shown[ROWS["acceleration"]][1]
-    for name in ("delay", "lag"):
-        assert not any("±" in text for text in shown[ROWS[name]])
+    result = fitted(runs, without=["Z16_minus"])
+    numbers = key_numbers(result)
+    doubtful = [
+        "acceleration_minus",
+        *(f"{name}_{way}" for name in ("delay", "lag") for way in WAYS),
+    ]
+    for label in doubtful:
+        assert numbers[label].interval == (None, None)
+        assert "Z16_minus fixed" in texts(result)[label]
     # the gain bends to make up for it, with some processors' last digits as far as it may: the dead
-    # zone is then 1.0 V, not 0.6, so that an interval, if one is printed, must hold the truth
-    negative = shown[ROWS["dead zone"]][1].replace("\N{MINUS SIGN}", "-")
-    if "±" in negative:
-        value, half = map(float, negative.split(" ± "))
-        assert abs(abs(value) - 0.6) <= half
-    assert "±" in shown[ROWS["dead zone"]][0]
+    # zone is then 1.0 V, not 0.6, so that its interval must hold the truth
+    low, high = numbers["dead_zone_minus"].interval
+    assert low <= -0.6 <= high
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("bounds", [(0.0, 0.4), (0.75, 2.0)])
-def test_an_estimate_at_its_bound_gives_no_interval(
+def test_an_estimate_at_its_bound_keeps_its_interval_and_is_named(
     runs: list[Experiment], bounds: tuple[float, float]
 ) -> None:
     """A dead zone of 0.6 V that the search was not allowed, and what it decides."""
     result = fitted(runs, bounds={"V_dz_minus": bounds})
     (stage,) = result.stages
     assert "V_dz_minus" in identifiability_of(stage).at_bounds
-    shown = cells(result)
-    assert "±" not in shown[ROWS["dead zone"]][1]
-    assert "V_dz_minus" in shown[ROWS["dead zone"]][1]
-    assert "bound" in shown[ROWS["dead zone"]][1]
-    # what it does not decide has its interval
-    assert "±" in shown[ROWS["dead zone"]][0]
-    assert "±" in shown[ROWS["acceleration"]][0]
-    # by how much the others follow it is the covariance's: all of its own variance
-    variances = variances_from_bounds(
-        result.stages, lambda one: machine_numbers_of(one, (8.0, 7.0))
-    )
-    whole = standard_errors(result.stages, lambda one: machine_numbers_of(one, (8.0, 7.0))) ** 2
-    share = variances["V_dz_minus"] / np.where(whole > 0.0, whole, inf)
-    assert share[ROWS["dead zone"], 1] == pytest.approx(1.0, rel=0.02)
-    assert share[ROWS["dead zone"], 0] < 0.1
-    assert (share < 1.02).all()
+    numbers = key_numbers(result)
+    for number in numbers.numbers:
+        assert number.name in ("jump", "creep") or None not in number.interval, number.label
+    assert "V_dz_minus at its bound" in texts(result)["dead_zone_minus"]
+    assert numbers["dead_zone_plus"].note == numbers["acceleration_plus"].note == ""
+
+
+@pytest.mark.slow
+def test_a_spread_is_that_of_the_covariance(found: Fit) -> None:
+    """Of the dead zone it is that of V_dz, as the jump is none: own errors and systematic ones."""
+    (stage,) = found.stages
+
+    def dead_zones(drive: Drive) -> np.ndarray:
+        return np.array([drive.parameters.numbers[f"V_dz_{way}"] for way in WAYS])
+
+    spread = spread_of(found.stages, dead_zones)
+    errors = np.array([found[f"V_dz_{way}"].standard_error for way in WAYS])
+    # and what assumed parameters add
+    assert (spread.half >= 1.96 * errors).all()
+    assert spread.half == pytest.approx(1.96 * errors, rel=0.05)
+    assert not spread.below.any()
+    assert not spread.above.any()
+    assert stage.stage.name == "drive"
 
 
 @pytest.mark.slow
 def test_a_way_that_no_run_goes_has_no_interval(runs: list[Experiment]) -> None:
-    shown = cells(fitted([run for run in runs if "up" in run.name]))
-    assert "±" in shown[ROWS["lag"]][0]
-    for name in ("dead zone", "top speed", "acceleration", "delay", "lag"):
-        assert shown[ROWS[name]][1].endswith("(not tested)")
+    shown = texts(fitted([run for run in runs if "up" in run.name]))
+    assert "±" in shown["lag_plus"]
+    for name in ("dead_zone", "gain", "top_speed", "acceleration", "delay", "lag"):
+        assert shown[f"{name}_minus"].endswith("(not tested)")
 
 
 @pytest.mark.slow
@@ -191,16 +197,17 @@ def test_what_a_guess_did_not_see_is_looked_for(runs: list[Experiment], tmp_path
     run = Drive(start).simulate(maneuvers.step(8.0))
     assert run.active("swash_stop").any()
     assert run.active("orifice").any()
-    table = str(guess_table(guess))
-    (top,) = (line for line in table.splitlines() if line.startswith("top speed"))
-    assert "at least" in top
-    assert top.count("not seen") == 1
+    numbers = key_numbers(Drive(start))
+    assert numbers["top_speed_plus"].text().startswith("at least")
+    assert numbers["top_speed_plus"].text().endswith("not seen")
+    assert numbers["acceleration_plus"].text() == "not seen"
+    assert numbers["top_speed_minus"].note == numbers["acceleration_minus"].note == ""
 
     Drive(start).to_toml(tmp_path / "start.toml")
     again = Drive.from_toml(tmp_path / "start.toml")
     assert again.parameters == start
     shown = str(envelope(again).table())
-    (speed,) = (line for line in shown.splitlines() if line.startswith("speed at full"))
+    (speed,) = (line for line in shown.splitlines() if line.startswith("top speed"))
     assert speed.count("at least") == 1
     (pull,) = (line for line in shown.splitlines() if line.startswith("acceleration at"))
     assert pull.count("not seen") == 1

@@ -1,3 +1,5 @@
+from .answers import key_numbers as key_numbers
+from .answers import numbers_of_fit as numbers_of_fit
 from .capability import AcceleratedBy as AcceleratedBy
 from .capability import AccelerationCurve as AccelerationCurve
 from .capability import DirectionLimits as DirectionLimits
@@ -5,7 +7,9 @@ from .capability import Envelope as Envelope
 from .capability import acceleration_curve as acceleration_curve
 from .capability import dead_zone as dead_zone
 from .capability import envelope as envelope
+from .capability import largest_commands as largest_commands
 from .capability import speed_limits as speed_limits
+from .capability import tested_step as tested_step
 from .capability import without_limits as without_limits
 from .compensation import INVERSE_MAP as INVERSE_MAP
 from .compensation import Improvement as Improvement
@@ -24,16 +28,11 @@ from .limits import LimitShare as LimitShare
 from .limits import LimitShares as LimitShares
 from .limits import limit_shares as limit_shares
 from .limits import shares_of as shares_of
-from .monte_carlo import ERROR_OF_ASSUMED as ERROR_OF_ASSUMED
 from .monte_carlo import Bands as Bands
 from .monte_carlo import Draws as Draws
-from .monte_carlo import assumed_parameters as assumed_parameters
 from .monte_carlo import bands as bands
-from .monte_carlo import changes_left_open as changes_left_open
 from .monte_carlo import drawn_drives as drawn_drives
-from .monte_carlo import standard_errors as standard_errors
 from .monte_carlo import stored_draws as stored_draws
-from .monte_carlo import variances_from_bounds as variances_from_bounds
 from .outcomes import OUTCOMES as OUTCOMES
 from .outcomes import Outcome as Outcome
 from .outcomes import Trial as Trial
@@ -44,6 +43,8 @@ from .outcomes import rms_difference as rms_difference
 from .outcomes import side_by_side as side_by_side
 from .outcomes import speed_per_volt as speed_per_volt
 from .outcomes import trial_of as trial_of
+from .propagation import Spread as Spread
+from .propagation import spread_of as spread_of
 from .sizing import DEFAULT_RANGE as DEFAULT_RANGE
 from .sizing import Performance as Performance
 from .sizing import Requirements as Requirements

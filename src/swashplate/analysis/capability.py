@@ -41,8 +41,9 @@ GRID = 200
 """Parts into which an interval is cut at each refinement."""
 CLOSE = 1e-12
 """Width at which an edge counts as found. [V]"""
-NEARLY_FULL = (1.0 - 1e-9) * FULL_VOLTAGE
-"""Above this voltage a drive counts as not saturated: its speed grows up to full voltage. [V]"""
+NEARLY = 1.0 - 1e-9
+"""Share of the largest command above which a drive counts as not saturated: its speed grows up to
+it. [1]"""
 
 
 def edge(holds: Callable[[Array], NDArray[np.bool_]], end: float) -> ConditionEdge:
@@ -69,13 +70,14 @@ def dead_zone(drive: Drive, direction: float) -> ConditionEdge:
     return edge(lambda volts: np.abs(drive.steady_current(volts)) <= dead, direction * FULL_VOLTAGE)
 
 
-def saturation(drive: Drive, direction: float) -> float | None:
-    """Command beyond which the steady speed stays as it is, None if it grows up to ±10 V. [V]"""
-    full = drive.steady_speed(direction * FULL_VOLTAGE)
-    inside, outside = edge(
-        lambda volts: drive.steady_speed(volts) != full, direction * FULL_VOLTAGE
-    )
-    return None if abs(inside) > NEARLY_FULL else outside
+def saturation(drive: Drive, largest: float) -> float | None:
+    """Command beyond which the steady speed stays as it is up to the largest one. [V]
+
+    None if the speed grows up to there.
+    """
+    full = drive.steady_speed(largest)
+    inside, outside = edge(lambda volts: drive.steady_speed(volts) != full, largest)
+    return None if abs(inside) > NEARLY * abs(largest) else outside
 
 
 # --- limits that may be elsewhere -----------------------------------------------------------------
@@ -100,6 +102,25 @@ def without_limits(drive: Drive, columns: Iterable[str]) -> Drive:
         farthest = farthest_stop(drive) if column.startswith("Z13") else inf
         limits[column] = max(farthest, numbers[column])
     return Drive(drive.parameters.with_numbers(limits))
+
+
+def largest_commands(drive: Drive) -> tuple[float, float]:
+    """Largest command each way that the tests of a drive used, magnitudes; ±10 V without tests. [V]
+
+    Of a way that no test goes it is the other's.
+    """
+    plus, minus = drive.parameters.tested or (0.0, 0.0)
+    usual = max(plus, minus) or FULL_VOLTAGE
+    return plus or usual, minus or usual
+
+
+USUAL_STEP = 9.0
+"""Step that drives without tests are compared by. [V]"""
+
+
+def tested_step(drive: Drive) -> float:
+    """Positive step that the tests of a drive cover. [V]"""
+    return USUAL_STEP if drive.parameters.tested is None else largest_commands(drive)[0]
 
 
 # --- acceleration ---------------------------------------------------------------------------------
@@ -163,14 +184,14 @@ def speed_limits(drive: Drive) -> tuple[float, float]:
     return float(low), float(high)
 
 
-def starting_acceleration(drive: Drive, direction: float) -> tuple[float, AcceleratedBy]:
-    """Acceleration of the plate upright under the full command, and what sets it. [rad/s²]
+def starting_acceleration(drive: Drive, voltage: float) -> tuple[float, AcceleratedBy]:
+    """Acceleration of the plate upright under a command [V], and what sets it. [rad/s²]
 
     Z10 Z1 Z8 √(Z9/2) x/(1 + Z6) without offset and leakage, x = Z16 if the orifice limits (Kruse
     2001, eqs. 6.67 to 6.71).
     """
     numbers = drive.parameters.numbers
-    curve = _curve(drive, direction * FULL_VOLTAGE, np.array([numbers["Z2"] / numbers["Z1"]]))
+    curve = _curve(drive, voltage, np.array([numbers["Z2"] / numbers["Z1"]]))
     return float(curve.acceleration[0]), curve.by[0]
 
 
@@ -215,9 +236,12 @@ SHORTEST, LONGEST = 8.0, 256.0
 """A step lasts so long at first, and at most, until the speed has come to stay. [s]"""
 
 
-def _row(label: str, unit: str, spec: str = "") -> Any:
-    """A field that is a row of the table, with its label, unit and format; None if not known."""
-    return field(default=None, metadata={"row": (label, unit, spec)})
+def _row(label: str, unit: str, spec: str = "", *, key: bool = False) -> Any:
+    """A field that is a row of the table, with its label, unit and format; None if not known.
+
+    `key` is whether `answers.key_numbers` has the number, too.
+    """
+    return field(default=None, metadata={"row": (label, unit, spec), "key": key})
 
 
 @dataclass(frozen=True)
@@ -225,21 +249,22 @@ class DirectionLimits(Result):
     """Capabilities of a drive in one direction, SI, with its sign; gains are positive."""
 
     accelerated_by: AcceleratedBy  # What sets the acceleration at rest.
-    dead_zone: float = _row("dead zone up to", "V")  # Largest command that moves nothing.
-    smallest_speed: float = _row("smallest speed", "rad/s")
+    dead_zone: float = _row("dead zone up to", "V", key=True)  # Largest command that moves nothing.
+    smallest_speed: float = _row("smallest speed", "rad/s", key=True)
     """Steady speed just beyond the dead zone: nothing slower can be held, save the creep."""
-    gain: float | None = _row("gain, mean", "rad/s/V")
-    """Slope of the steady map from the dead zone to saturation or ±10 V."""
+    gain: float | None = _row("gain, mean", "rad/s/V", key=True)
+    """Slope of the steady map from the dead zone to saturation or the largest command."""
     smallest_gain: float | None = _row("gain, smallest", "rad/s/V")
     largest_gain: float | None = _row("gain, largest", "rad/s/V")
     saturation_voltage: float | None = _row("saturation voltage", "V", ".2f")
-    """Command beyond which the speed stays; None if it grows up to ±10 V."""
-    top_speed: float = _row("speed at full voltage", "rad/s")  # Steady, at ±10 V.
+    """Command beyond which the speed stays; None if it grows up to the largest command."""
+    top_speed: float = _row("top speed", "rad/s", key=True)  # Steady, at the largest command.
     speed_limit: float = _row("speed limit", "rad/s")
     """Speed with the swash plate at its stop, or with the pressure held by Z15."""
-    acceleration: float = _row("acceleration at rest", "rad/s^2", "z.2f")  # Under ±10 V.
+    acceleration: float = _row("acceleration at rest", "rad/s^2", "z.2f", key=True)
+    """Under the largest command."""
     starting_rise: float | None = _row("starting, 10 to 90 %", "s")
-    """Time from 10 % to 90 % of a step to ±10 V from rest; None if nothing moves."""
+    """Time from 10 % to 90 % of a step to the largest command from rest; None if nothing moves."""
     starting_reach: float | None = _row("starting, to 90 %", "s")
     """Time from that command to 90 %."""
     stopping_rise: float | None = _row("stopping, 10 to 90 %", "s")
@@ -262,7 +287,7 @@ PLUS, MINUS = 0, 1
 
 @dataclass(frozen=True, eq=False)
 class Envelope(Tabular, Drawn):
-    """Capabilities of a drive in both directions."""
+    """Capabilities of a drive in both directions, up to the largest command of its tests."""
 
     drawn_by: ClassVar[str] = "plot_envelope"
 
@@ -273,9 +298,11 @@ class Envelope(Tabular, Drawn):
     plus: DirectionLimits
     minus: DirectionLimits
     accelerating: tuple[AccelerationCurve, AccelerationCurve]
-    """Largest acceleration over the speed under +10 V and -10 V."""
+    """Largest acceleration over the speed under the largest commands."""
     released: AccelerationCurve
     """Acceleration over the speed with the joystick released."""
+    largest: tuple[float, float]
+    """Largest command each way, magnitudes. [V]"""
     with_limits_at_test_end: tuple[DirectionLimits, DirectionLimits] | None = None
     """Both directions if each limit that no test reached acts just beyond what was tested; None if
     the tests reached all limits."""
@@ -284,8 +311,11 @@ class Envelope(Tabular, Drawn):
     orifice_unknown: tuple[bool, bool] = (False, False)
     """Whether it is not known how far the tests opened the orifice of a direction."""
 
-    def table(self) -> Table:
-        """Dead zone, gains, limits and times of both directions."""
+    def table(self, *, rest: bool = False) -> Table:
+        """Dead zone, gains, limits and times of both directions.
+
+        With `rest` only what `key_numbers` does not have.
+        """
         columns = (
             Column("Envelope", key="quantity"),
             Column("positive", "z.3f", none="none", key="plus"),
@@ -295,13 +325,16 @@ class Envelope(Tabular, Drawn):
         table = Table("", columns)
         for quantity in fields(DirectionLimits):
             name = quantity.name
-            if "row" in quantity.metadata:
+            if "row" in quantity.metadata and not (rest and quantity.metadata["key"]):
                 label, unit, spec = quantity.metadata["row"]
                 cells = (self._cell(name, index, unit) for index in (PLUS, MINUS))
                 table.add(Cell(name, label), *cells, unit=unit, spec=spec)
             if name == "acceleration":
                 causes = (self._accelerated_by(index) for index in (PLUS, MINUS))
-                table.add(Cell("accelerated_by", "... set by the"), *causes)
+                words = "acceleration at rest set by the" if rest else "... set by the"
+                table.add(Cell("accelerated_by", words), *causes)
+        if rest:
+            return table
         creep = Cell("creep", "creep at 0 V")
         table.add(creep, self.creep, Cell(self.creep, ""), unit="rad/s", section=True)
         return table
@@ -315,7 +348,10 @@ class Envelope(Tabular, Drawn):
         if at_test_end is None or unlimited is None:
             is_open = at_test_end is not unlimited
         else:
-            is_open = abs(unlimited - at_test_end) > DECIDES * abs(at_test_end)
+            # where such a limit stands is no estimate
+            value = getattr((self.plus, self.minus)[index], name)
+            others = [unlimited] if value is None else [unlimited, value]
+            is_open = any(abs(other - at_test_end) > DECIDES * abs(at_test_end) for other in others)
         return OpenRange(at_test_end, unlimited) if is_open else None
 
     def _cell(self, name: str, index: int, unit: str) -> float | Cell | None:
@@ -327,7 +363,7 @@ class Envelope(Tabular, Drawn):
         at_test_end, unlimited = open_range
         if at_test_end is None or unlimited is None or self._orifice_decides(index, name):
             return Cell(None, "not seen")
-        relation = "at least" if abs(unlimited) > abs(at_test_end) else "at most"
+        relation = "at least" if abs(unlimited) >= abs(at_test_end) else "at most"
         bound = plain(display_unit(unit).factor * at_test_end, 4)
         return Cell(at_test_end, f"{relation} {bound}, not seen")
 
@@ -374,16 +410,18 @@ def envelope(drive: Drive) -> Envelope:
     (0.21, 3.42)
     """
     plus, minus = _both_directions(drive)
+    largest = largest_commands(drive)
     capability = Envelope(
         name=drive.name,
         creep=float(drive.steady_speed(0.0)),
         plus=plus,
         minus=minus,
         accelerating=(
-            acceleration_curve(drive, FULL_VOLTAGE),
-            acceleration_curve(drive, -FULL_VOLTAGE),
+            acceleration_curve(drive, largest[0]),
+            acceleration_curve(drive, -largest[1]),
         ),
         released=acceleration_curve(drive, 0.0),
+        largest=largest,
     )
     unreached = drive.parameters.unreached
     if not unreached:
@@ -404,13 +442,14 @@ def envelope(drive: Drive) -> Envelope:
 
 def _both_directions(drive: Drive) -> tuple[DirectionLimits, DirectionLimits]:
     low, high = speed_limits(drive)
-    return _limits_of(drive, 1.0, high), _limits_of(drive, -1.0, low)
+    plus, minus = largest_commands(drive)
+    return _limits_of(drive, plus, high), _limits_of(drive, -minus, low)
 
 
-def _limits_of(drive: Drive, direction: float, speed_limit: float) -> DirectionLimits:
-    inside, outside = dead_zone(drive, direction)
-    full = direction * FULL_VOLTAGE
-    acceleration, accelerated_by = starting_acceleration(drive, direction)
+def _limits_of(drive: Drive, full: float, speed_limit: float) -> DirectionLimits:
+    """Capabilities up to a command."""
+    inside, outside = dead_zone(drive, float(np.sign(full)))
+    acceleration, accelerated_by = starting_acceleration(drive, full)
     top = float(drive.steady_speed(full))
     limits: dict[str, Any] = {
         "accelerated_by": accelerated_by,
@@ -420,9 +459,9 @@ def _limits_of(drive: Drive, direction: float, speed_limit: float) -> DirectionL
         "top_speed": top,
         "speed_limit": speed_limit,
     }
-    if outside is None:  # no command moves it
+    if outside is None or abs(outside) >= abs(full):  # no command moves it
         return DirectionLimits(**limits)
-    saturated = saturation(drive, direction)
+    saturated = saturation(drive, full)
     volts = np.linspace(outside, full if saturated is None else saturated, GAIN_POINTS)
     speeds = drive.steady_speed(volts)
     slopes = np.diff(speeds) / np.diff(volts)

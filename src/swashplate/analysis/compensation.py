@@ -363,8 +363,8 @@ def inverse_map(drive: Drive, points: int = 101) -> InverseMap:
             f"{low:.4g} and {high:.4g} deg/s, so its steady map has no inverse; check Z17, Z18 and "
             "the card's J."
         )
-    upwards, _ = starting_acceleration(drive, 1.0)
-    downwards, _ = starting_acceleration(drive, -1.0)
+    upwards, _ = starting_acceleration(drive, FULL_VOLTAGE)
+    downwards, _ = starting_acceleration(drive, -FULL_VOLTAGE)
     errors = list[float]()
     lags = list[float]()
     for branch in (plus, minus):
@@ -390,7 +390,7 @@ def inverse_map(drive: Drive, points: int = 101) -> InverseMap:
 def _branch(drive: Drive, direction: float, points: int) -> MapBranch:
     """Points of one direction, from the lower voltage to the higher."""
     start = dead_zone(drive, direction).outside
-    saturated = saturation(drive, direction)
+    saturated = saturation(drive, direction * FULL_VOLTAGE)
     end = direction * FULL_VOLTAGE if saturated is None else saturated
     if start is None or start == end:
         side = "positive" if direction > 0.0 else "negative"

@@ -114,6 +114,9 @@ class LimitShare(Removal):
     """Rms tracking error with this limit and none of the others. [rad/s]"""
     failure: str = ""
     """Why a drive without it cannot be simulated."""
+    unreached: bool = False
+    """Whether no test of the drive reached it, so that its value only marks how far the tests
+    went."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -140,8 +143,12 @@ class LimitShares(Tabular):
 
     @property
     def first(self) -> LimitShare | None:
-        """The limit to change first; None if no single change makes the error smaller."""
-        costliest = self.shares[0] if self.shares else None
+        """The limit to change first; None if no single change makes the error smaller.
+
+        None that no test reached: nobody knows where it lies.
+        """
+        reached = [share for share in self.shares if not share.unreached]
+        costliest = reached[0] if reached else None
         if costliest is None or (costliest.error_share or 0.0) <= 0.0:
             return None
         return costliest
@@ -295,6 +302,7 @@ def shares_of(drive: Drive, run: Simulation, reference: ArrayLike | None = None)
 
     error = rms_difference(run.shaft_speed, reference_speed)
     shares = []
+    unseen = drive.parameters.unreached.keys()
     for removal in present:
         speed = speed_without([removal])
         error_without = error_of(speed)
@@ -302,6 +310,7 @@ def shares_of(drive: Drive, run: Simulation, reference: ArrayLike | None = None)
         if error_without is not None:
             error_share = 1.0 - error_without / error if error else 0.0
         others = [other for other in removable if other is not removal]
+        columns = drive.parameters.definitions.columns_of(removal.changes)
         shares.append(
             LimitShare(
                 **vars(removal),
@@ -310,14 +319,15 @@ def shares_of(drive: Drive, run: Simulation, reference: ArrayLike | None = None)
                 error_share=error_share,
                 error_as_only_limit=error_of(speed_without(others)),
                 failure=speed if isinstance(speed, str) else "",
+                unreached=bool(columns) and set(columns) <= unseen,
             )
         )
     shares.sort(key=lambda share: inf if share.error is None else share.error)
     acting_columns = set[str]()
     for share in shares:
         if share.time_share:
-            acting_columns.update(share.changes)
-    unreached = [column for column in drive.parameters.unreached if column in acting_columns]
+            acting_columns.update(drive.parameters.definitions.columns_of(share.changes))
+    unreached = [column for column in unseen if column in acting_columns]
     result = LimitShares(
         name=drive.name,
         run=run,

@@ -152,7 +152,7 @@ def proportional_speed(drive: Drive, voltage: ArrayLike, *, limited: bool = True
 def speed_per_volt(drive: Drive, sign: float) -> float:
     """Speed limit of a direction by the voltage that first reaches it. [(rad/s)/V]"""
     full = float(np.copysign(FULL_VOLTAGE, sign))
-    return abs(drive.steady_speed(full) / (saturation(drive, sign) or full))
+    return abs(drive.steady_speed(full) / (saturation(drive, full) or full))
 
 
 # --- outcomes -------------------------------------------------------------------------------------

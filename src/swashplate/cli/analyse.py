@@ -47,6 +47,7 @@ from swashplate.cli.terminal import (
     save,
     say,
     show,
+    show_numbers,
     spinner,
 )
 from swashplate.errors import InputError
@@ -99,8 +100,10 @@ def limits(
 ) -> None:
     """Show the limits of a machine, or those that act under a command.
 
-    Of a drive without a command: dead zone, gain, limits of speed and
-    acceleration, rise times ('swashplate bode' shows the frequency response).
+    Of a drive without a command: the numbers that matter, with the intervals of
+    its fit, what limits it up to the largest command of its tests and what to
+    change first; then what it can do at full voltage ('swashplate bode' shows the
+    frequency response).
     With a command: how often each limit acts and by how much the error falls
     without it, which tells which component to change first. The error is the RMS
     difference of the speed from that of a drive without limits. The shares need
@@ -116,10 +119,13 @@ def limits(
     if maneuver is None:
         with spinner("Measuring"):
             capability = envelope(drive)
+            numbers = parsing.key_numbers_of(machine.drive, drive)
         save(out, "Envelope, in SI", capability.write)
         draw_figure(plot, "plot_envelope", capability)
-        machine.note(f"{machine.title}: performance envelope")
-        show(capability.table())
+        machine.note(f"{machine.title}: the numbers that matter")
+        show_numbers(numbers)
+        note(f"\nUp to {numbers.commands_text}")
+        show(capability.table(rest=True))
         return
     with spinner("Simulating"):
         marched = trials.at_rate(drive, sampling.rate)
@@ -467,8 +473,10 @@ def compensate(
             f"--speed-deg-s {stick}."
         )
     with spinner("Inverting"):
+        numbers = parsing.key_numbers_of(drive.drive, drive.loaded_drive)
         marched = trials.at_rate(drive.loaded_drive, sampling.rate)
-        inverse = analysis.inverse_map(marched, points)
+        creeping = not any(number.unseen for number in numbers.numbers if number.name == "creep")
+        inverse = analysis.inverse_map(marched if creeping else marched.replace(Z18=0.0), points)
         improvement = None
         tables = inverse.tables([radians(speed) for speed in speeds_deg_s or ()])
         if stick is not None:
@@ -479,6 +487,8 @@ def compensate(
     save(out, "Inverse map, in SI", inverse.write)
     draw_figure(plot, "plot_compensation", inverse, improvement)
     drive.note(f"{drive.title}: voltage for a required speed")
+    if not creeping:
+        note(f"Creep at rest: {numbers['creep'].shown}. The map takes it as none (Z18 = 0).")
     if inverse.logged is not None:
         note(f"{inverse.logged.sentence}; the tables give both.")
     show(*tables)

@@ -35,6 +35,7 @@ from swashplate.cli.terminal import (
     save,
     say,
     show,
+    show_numbers,
     spinner,
 )
 from swashplate.errors import InputError
@@ -445,9 +446,10 @@ def guess(
     their bounds, setup.toml.
     """
     from swashplate import drafting
+    from swashplate.analysis import key_numbers
     from swashplate.campaign import spiked
     from swashplate.drive import Drive
-    from swashplate.identification import runs_to_fit
+    from swashplate.identification import logged_command, motion_of, runs_to_fit
 
     folder = path.parent if out is None else out
     start = folder / "start.toml"
@@ -458,11 +460,17 @@ def guess(
         check_folder(folder)
         runs = runs_to_fit(campaign, axis_name)
         guessed = drafting.guess_drive(runs)
-        parameters = drafting.guessed_set(guessed, path.name)
+        parameters = replace(
+            drafting.guessed_set(guessed, path.name),
+            command=logged_command(campaign, axis_name),
+            motion=motion_of(runs),
+        )
         made_folder(folder)
         Drive(parameters).to_toml(start)
         write_text(drafting.guessed_fit_setup(guessed, parameters), setup)
-    show(drafting.guess_table(guessed))
+        numbers = key_numbers(Drive(parameters))
+    note(f"{guessed.axis}: first guess of the numbers that matter")
+    show_numbers(numbers)
     if guessed.amplifier is not None:
         show(drafting.amplifier_table(guessed.amplifier))
         card = guessed.amplifier.card

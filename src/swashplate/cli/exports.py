@@ -19,7 +19,7 @@ from swashplate.cli.options import (
     new_file,
     new_folder,
 )
-from swashplate.cli.parsing import campaign_of, drive_file
+from swashplate.cli.parsing import campaign_of, drive_file, key_numbers_of
 from swashplate.cli.terminal import check_free, note, save, spinner
 from swashplate.cli.trials import commanded_inputs, named_maneuver
 from swashplate.errors import InputError
@@ -213,6 +213,7 @@ def live(
     with spinner("Writing the page"):
         from swashplate.report.fit_report import write_live_page
 
+        numbers = key_numbers_of(drive.drive, drive.loaded_drive)
         parameter_file = drive_file(drive.drive)
         name = (
             str(parameter_file)
@@ -222,11 +223,18 @@ def live(
         if path is not None:
             campaign, axis_name = campaign_of(path, axis)
             sentences = write_live_page(
-                drive.loaded_drive, out, campaign=campaign, axis=axis_name, name=name
+                drive.loaded_drive,
+                out,
+                campaign=campaign,
+                axis=axis_name,
+                name=name,
+                key_numbers=numbers,
             )
         else:
             command = named_maneuver(maneuver or "", drive.loaded_drive)
-            sentences = write_live_page(drive.loaded_drive, out, command=command, name=name)
+            sentences = write_live_page(
+                drive.loaded_drive, out, command=command, name=name, key_numbers=numbers
+            )
     drive.warn()
     _note_page(out, [*drive.changes, *sentences])
 

@@ -38,6 +38,7 @@ from swashplate.cli.terminal import (
     say,
     say_saved,
     show,
+    show_numbers,
     side,
     spinner,
 )
@@ -241,10 +242,13 @@ def fit(
         lines = _written(result, out)
         lines += [_reported(result, out)] if report else []
     note(parsing.title_of(campaign))
+    if result.key_numbers is not None:
+        show_numbers(result.key_numbers)
+    _say_verdict(verdict)
     _say_fit(result)
     for line in [*lines, f"Time:      {clock}"] if timing else lines:
         note(line)
-    _say_verdict(verdict)
+    _end(verdict)
 
 
 def _say_fit(result: Identification) -> None:
@@ -277,10 +281,12 @@ def _reported(result: Identification, out: Path, truth: ParameterSet | None = No
 
 
 def _say_verdict(verdict: Verdict) -> None:
-    """Print the stated errors, what the verdict rests on, its answers, and the headline.
-
-    Ends with code 1 if the assessed drive is not usable.
-    """
+    """Print the verdict: its headline, the stated errors, what it rests on, and its answers."""
+    note("")
+    if verdict.usable:
+        say(verdict.headline)
+    if verdict.validity:
+        say(verdict.validity)
     show(verdict.table())
     bullets(verdict.remarks)
     if verdict.assumed:
@@ -288,12 +294,14 @@ def _say_verdict(verdict: Verdict) -> None:
     bullets(verdict.assumed)
     for name, answer in verdict.answers().items():
         say(f"{name}: {answer}")
+
+
+def _end(verdict: Verdict) -> None:
+    """End with the headline if the assessed drive is usable, otherwise with it and code 1."""
     if not verdict.usable:
         side.print(verdict.headline)
         raise typer.Exit(1)
     say(verdict.headline)
-    if verdict.validity:
-        say(verdict.validity)
 
 
 @command(
@@ -324,8 +332,10 @@ def validate(
     Prints the errors of each run, the structure left in the residuals, and a
     verdict. Exit code 1: the drive is not usable for these runs.
     """
+    from swashplate.drive import Drive
     from swashplate.identification import assess_fit, predict, runs_tables, versions, with_speeds
     from swashplate.identification.diagnostics import refuse_unsound, spike_findings
+    from swashplate.parameters import ParameterSet
 
     if out is not None:
         check_folder(out)
@@ -354,6 +364,9 @@ def validate(
         stated = None if of_fit is None else of_fit.verdict
         verdict = assess_fit((), predicted, required=require / 100.0, of_fit=stated)
         measures = runs_tables(with_speeds(predicted))
+        numbers = None
+        if isinstance(parameters, ParameterSet):
+            numbers = parsing.key_numbers_of(drive, Drive(parameters))
     lines = []
     if out is not None:
         from swashplate.report.fit_report import write_validation_report
@@ -363,15 +376,24 @@ def validate(
             page = out / PAGE
             notes = {**versions(), "drive from": drive}
             write_validation_report(
-                parameters, campaign, page, predicted, verdict=verdict, notes=notes
+                parameters,
+                campaign,
+                page,
+                predicted,
+                verdict=verdict,
+                notes=notes,
+                key_numbers=numbers,
             )
         lines = [f"Measures:  {out / 'measures.csv'}", f"Report:    {page}"]
     note(f"{parsing.title_of(campaign)}, {axis_name}: {parameters.name} from {drive}")
+    if numbers is not None:
+        show_numbers(numbers)
+    _say_verdict(verdict)
     show(*measures)
     say(MEASURES)
     for line in lines:
         note(line)
-    _say_verdict(verdict)
+    _end(verdict)
 
 
 @command(

@@ -16,7 +16,7 @@ from swashplate.units import unit_text
 if TYPE_CHECKING:
     from swashplate.analysis import FactorRange
     from swashplate.campaign import Campaign, Experiment
-    from swashplate.drive import Drive
+    from swashplate.drive import Drive, KeyNumbers
     from swashplate.identification import FitSetup, ModelSetup, StoredVerdict
     from swashplate.logs import TextOptions
     from swashplate.parameters import Change, Parameter, ParameterSet
@@ -234,6 +234,14 @@ def fit_of(word: str, numbers: Mapping[str, float]) -> StoredVerdict | None:
     if stored is None or stored.numbers != dict(numbers):
         return None
     return stored
+
+
+def key_numbers_of(word: str, drive: Drive) -> KeyNumbers:
+    """The numbers that matter of a drive, with intervals if it is that of the named fit."""
+    from swashplate.analysis import key_numbers
+
+    stored = fit_of(word, drive.parameters.numbers)
+    return (stored and stored.key_numbers) or key_numbers(drive)
 
 
 # --- changes and design variables -----------------------------------------------------------------

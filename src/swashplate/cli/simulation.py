@@ -24,7 +24,7 @@ from swashplate.cli.options import (
     Simulating,
     TableFile,
 )
-from swashplate.cli.terminal import draw_figure, note, save, say, show, spinner
+from swashplate.cli.terminal import draw_figure, note, save, say, show, show_numbers, spinner
 from swashplate.documents import parse_toml
 from swashplate.errors import InputError
 from swashplate.tables import Column, Table, quantity, write_table
@@ -108,28 +108,42 @@ def compare(
     second: Annotated[str, typer.Argument(metavar="B", help="Drive to compare with the first.")],
     *,
     maneuver: Annotated[
-        str,
-        typer.Option(metavar="NAME", help='Maneuver for both, such as step:9 or "step +9 V".'),
-    ] = "step:9",
+        str | None,
+        typer.Option(
+            metavar="NAME",
+            help=(
+                'Maneuver for both, such as step:9 or "step +9 V" (default: a step to the largest '
+                "command that was tested with both)."
+            ),
+        ),
+    ] = None,
     rate: RateOption = 512.0,
     plot: FigureFile = None,
     out: TableFile = None,
     force: Force = False,
 ) -> None:
-    """Compare two drives over the same maneuver.
+    """Compare two drives: the numbers that matter, and both over the same maneuver.
 
-    Prints performance metrics of both, such as the final speed: the speed at the
-    last moment at which the voltage is at its largest. --out writes the voltage
-    and both speeds.
+    Of a fitted drive the numbers have the intervals of its fit. Of the maneuver
+    it prints performance metrics, such as the final speed: the speed at the last
+    moment at which the voltage is at its largest. --out writes the voltage and
+    both speeds.
     """
     with spinner("Simulating"):
-        from swashplate.analysis import rms_difference, side_by_side
+        from swashplate.analysis import rms_difference, side_by_side, tested_step
 
-        pair = [trials.at_rate(parsing.drive_of(word), rate) for word in (first, second)]
+        named = [parsing.drive_of(word) for word in (first, second)]
+        numbers = [
+            parsing.key_numbers_of(word, drive)
+            for word, drive in zip((first, second), named, strict=True)
+        ]
+        pair = [trials.at_rate(drive, rate) for drive in named]
         labels = [drive.name for drive in pair]
         if labels[0] == labels[1]:  # then by what was typed
             labels = [first, second if second != first else f"{second} (2)"]
         drives = dict(zip(labels, pair, strict=True))
+        if maneuver is None:
+            maneuver = f"step:{min(tested_step(drive) for drive in named):g}"
         test = trials.named_maneuver(maneuver, *pair)
         voltage = test.sample(rate)
         runs = {label: drive.simulate(voltage, rate) for label, drive in drives.items()}
@@ -146,6 +160,10 @@ def compare(
 
     save(out, "Voltage and both speeds, in SI", write)
     draw_figure(plot, "plot_comparison", runs, title=title)
+    for label, one in zip(runs, numbers, strict=True):
+        note(f"{label}: the numbers that matter")
+        show_numbers(one)
+        note("")
     note(title)
     show(table)
     note(f"rms difference of the speeds: {quantity(rms, 'rad/s', spec='.2f')}")

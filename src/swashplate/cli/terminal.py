@@ -10,7 +10,7 @@ from contextlib import ExitStack, contextmanager
 from contextvars import ContextVar
 from pathlib import Path
 from textwrap import fill
-from typing import Any, NoReturn
+from typing import TYPE_CHECKING, Any, NoReturn
 
 import rich.table
 from rich import box
@@ -20,6 +20,9 @@ from rich.status import Status
 from swashplate.errors import FileError
 from swashplate.progress import Work, shown_by
 from swashplate.tables import UNIT, Form, Table, check_place, ending
+
+if TYPE_CHECKING:
+    from swashplate.drive import KeyNumbers
 
 SAVED: ContextVar[list[str]] = ContextVar("SAVED")
 """Lines on the files that a command wrote."""
@@ -200,6 +203,12 @@ def say(text: str) -> None:
 def note(text: str) -> None:
     """Print a line, never broken, so that a path in it can be copied."""
     output.print(text, soft_wrap=True)
+
+
+def show_numbers(numbers: KeyNumbers) -> None:
+    """Print the numbers that matter of a machine, and what they say."""
+    show(numbers.table())
+    bullets(numbers.sentences)
 
 
 def bullets(*groups: Iterable[str]) -> None:

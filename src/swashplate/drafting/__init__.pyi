@@ -8,6 +8,5 @@ from .draft import UNUSED as UNUSED
 from .draft import draft_campaign as draft_campaign
 from .guess import Guess as Guess
 from .guess import guess_drive as guess_drive
-from .guess import guess_table as guess_table
 from .starting_point import guessed_fit_setup as guessed_fit_setup
 from .starting_point import guessed_set as guessed_set

@@ -10,7 +10,7 @@ here are judgement, and a fit depends on them only by where its search begins.
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from math import inf, isfinite, sqrt
+from math import sqrt
 from typing import NamedTuple
 
 import numpy as np
@@ -44,8 +44,6 @@ from swashplate.drafting.mean_speeds import (
 from swashplate.drafting.plain_search import ONE_WAY, goes_with_command, searched_numbers
 from swashplate.errors import InputError
 from swashplate.results import short
-from swashplate.tables import UNIT, Cell, Column, Table
-from swashplate.units import display_unit
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -309,49 +307,3 @@ def steady_speed(guess: Guess, side: int) -> float:
     along = (1.0 - 2.0 * side) * (guess.creep or 0.0)
     speed = guess.gain[side] * beyond + guess.jump[side] + along
     return min(speed, guess.top_speed[side]) or guess.speed
-
-
-def guess_table(guess: Guess) -> Table:
-    """Table of a guess, a column for each way."""
-    columns = (
-        Column(""),
-        Column("plus", ".4g", none="not seen"),
-        Column("minus", ".4g", none="not seen"),
-        UNIT,
-    )
-    table = Table(f"Axis {guess.axis}, first guess", columns)
-    rows = (
-        ("dead zone", guess.dead_zone, "V", ".3g"),
-        ("gain beyond it", guess.gain, f"{guess.unit}/V", ""),
-        ("jump at its edge", (guess.jump[0] or inf, guess.jump[1] or inf), guess.unit, ""),
-        ("top speed", guess.top_speed, guess.unit, ""),
-        ("acceleration", guess.acceleration, f"{guess.unit}^2", ""),
-    )
-    for name, (plus, minus), unit, spec in rows:
-        table.add(
-            name,
-            _guessed_cell(guess, 0, name, plus),
-            _guessed_cell(guess, 1, name, minus),
-            unit=unit,
-            spec=spec,
-        )
-    table.add("delay", 1e3 * guess.delay, "", unit="ms", spec=".3g")
-    table.add("lag", 1e3 * guess.lag, "", unit="ms", spec=".3g")
-    creep: Cell | float = guess.creep or Cell(None, "not seen")
-    if guess.creep is None:
-        creep = Cell(None, "no long rest")
-    table.add("creep at rest", creep, "", unit=guess.unit, spec=".3g")
-    return table
-
-
-def _guessed_cell(guess: Guess, side: int, name: str, value: float) -> Cell | float | None:
-    """Cell of a way, 0 plus and 1 minus; an infinite value was not seen."""
-    if not guess.command[side]:
-        return Cell(None, "not tried")
-    if isfinite(value):
-        return value
-    if name == "top speed":
-        fastest = steady_speed(guess, side)
-        shown = display_unit(guess.unit, fastest).factor * fastest
-        return Cell(None, f"at least {shown:.3g}, not seen")
-    return None

@@ -154,6 +154,7 @@ def guessed_set(guess: Guess, source: str) -> ParameterSet:
         parameters=parameters,
         rate=rate,
         unreached=unreached,
+        tested=guess.command,
     )
 
 

@@ -13,6 +13,15 @@ from .linear_drive import LinearDrive as LinearDrive
 from .linear_drive import model_tables as model_tables
 from .march import Sample as Sample
 from .march import simulate_drive as simulate_drive
+from .quoted import AT_BOUND as AT_BOUND
+from .quoted import FIXED as FIXED
+from .quoted import NOT_SEEN as NOT_SEEN
+from .quoted import ActingLimit as ActingLimit
+from .quoted import Direction as Direction
+from .quoted import FirstChange as FirstChange
+from .quoted import KeyNumber as KeyNumber
+from .quoted import KeyNumbers as KeyNumbers
+from .quoted import command_unit as command_unit
 from .records import RunKeywords as RunKeywords
 from .records import drive_records as drive_records
 from .signals import MEASURED as MEASURED

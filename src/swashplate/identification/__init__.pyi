@@ -1,8 +1,10 @@
 from .assessment import Identification as Identification
 from .assessment import StoredVerdict as StoredVerdict
+from .assessment import logged_command as logged_command
 from .assessment import motion_of as motion_of
 from .assessment import parts_of as parts_of
 from .assessment import read_verdict as read_verdict
+from .assessment import tested_commands as tested_commands
 from .assessment import versions as versions
 from .band import Band as Band
 from .band import speed_band as speed_band
@@ -53,11 +55,11 @@ from .statistics.intervals import Uncertainty as Uncertainty
 from .statistics.intervals import estimates_of as estimates_of
 from .statistics.intervals import uncertainty as uncertainty
 from .statistics.intervals import uncertainty_of as uncertainty_of
+from .statistics.left_open import posterior_of as posterior_of
 from .statistics.model_design import model_prior_information as model_prior_information
 from .statistics.model_design import model_run_information as model_run_information
 from .statistics.profiles import Profile as Profile
 from .statistics.profiles import profiles_of as profiles_of
-from .statistics.propagation import posterior_of as posterior_of
 from .tables import estimates_table as estimates_table
 from .tables import fixed_table as fixed_table
 from .tables import ignored_words as ignored_words

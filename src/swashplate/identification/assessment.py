@@ -11,7 +11,7 @@ from functools import cached_property
 from html import escape
 from importlib import import_module
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Unpack
+from typing import TYPE_CHECKING, Any, Unpack, cast
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -21,12 +21,13 @@ from tomlkit import dumps
 from swashplate.__about__ import __version__
 from swashplate.campaign import Between, Campaign, Experiment
 from swashplate.documents import read_json
-from swashplate.drive import Drive, RunKeywords
+from swashplate.drive import Drive, KeyNumbers, RunKeywords
 from swashplate.entries import Document, FileTable
 from swashplate.errors import DomainError, FileError, InputError, MissingFileError
 from swashplate.identification import tables
 from swashplate.identification.band import Band, speed_band
 from swashplate.identification.diagnostics.verdict import REQUIRED, Verdict, assess_fit
+from swashplate.identification.estimation.drive_model import limits_unreached
 from swashplate.identification.estimation.model_setup import ModelSetup
 from swashplate.identification.estimation.posterior import Posterior
 from swashplate.identification.estimation.problem import Problem
@@ -43,14 +44,10 @@ from swashplate.identification.fitting import (
 )
 from swashplate.identification.resampling import CrossValidation, folds_tables
 from swashplate.identification.stage_fit import Interval, StageFit
-from swashplate.identification.statistics.intervals import (
-    Estimate,
-    estimates_of,
-    intervals_of,
-    unseen_limits,
-)
+from swashplate.identification.statistics.experiment_design import Commands, commands_each_way
+from swashplate.identification.statistics.intervals import Estimate, estimates_of, intervals_of
+from swashplate.identification.statistics.left_open import posterior_of
 from swashplate.identification.statistics.profiles import Profile
-from swashplate.identification.statistics.propagation import posterior_of
 from swashplate.identification.validation import RunQuality, predict
 from swashplate.locks import locked
 from swashplate.machine.marching import SOURCE_RATE, Start
@@ -66,7 +63,7 @@ from swashplate.parameters import (
     read_set,
 )
 from swashplate.progress import working
-from swashplate.results import folded
+from swashplate.results import folded, listing
 from swashplate.tables import Table, count, write_text
 
 if TYPE_CHECKING:
@@ -206,15 +203,31 @@ class Identification(Estimated):
             raise InputError("No run of the fit moved: nothing is known of the error of a speed.")
         return band
 
+    @cached_property
+    def key_numbers(self) -> KeyNumbers | None:
+        """The numbers that matter of the drive, with 95 % intervals; None of a user-defined model.
+
+        See `swashplate.analysis.key_numbers`.
+        """
+        if isinstance(self.fit.parameters, ModelSetup):
+            return None
+        if self.stored is not None and self.stored.numbers == dict(self.fit.parameters.numbers):
+            return self.stored.key_numbers
+        # by name, as it stands above this package
+        answers = import_module("swashplate.analysis")
+        with working("Computing the numbers that matter"):
+            return cast("KeyNumbers", answers.numbers_of_fit(self.drive, self.fit.stages))
+
     def tables(self) -> list[Table]:
-        """Stated errors, then estimates, profiles, errors of runs, cross-validation."""
+        """Numbers that matter, stated errors, estimates, profiles, runs, cross-validation."""
         part_tables = [table for part in parts_of(self) for table in part.tables]
-        return [self.verdict.table(), *part_tables]
+        return [*_number_tables(self), self.verdict.table(), *part_tables]
 
     def summary(self) -> str:
-        """Text: the verdict, then what the command ``fit`` prints."""
+        """Text: the verdict and the numbers that matter, then the tables of the command ``fit``."""
         single = "\n".join(tables.single_runs_line(self.fit.stages))
-        parts = [self.verdict.summary(), *map(str, parts_of(self)), single]
+        numbers = [*map(str, _number_tables(self)), *(self.key_numbers or _NONE).sentences]
+        parts = [self.verdict.summary(), "\n".join(numbers), *map(str, parts_of(self)), single]
         return "\n\n".join(part for part in parts if part)
 
     def _repr_html_(self) -> str:
@@ -226,7 +239,9 @@ class Identification(Estimated):
             details += folded(part.title, visible_tables, [*part.remarks, *part.sentences])
         for line in tables.single_runs_line(self.fit.stages):
             estimates += f"<p>{escape(line)}</p>"
-        return f"{self.verdict.html(estimates)}{details}"
+        numbers = "".join(table._repr_html_() for table in _number_tables(self))
+        numbers += listing((self.key_numbers or _NONE).sentences)
+        return f"{self.verdict.html(numbers + estimates)}{details}"
 
     @property
     def headline(self) -> str:
@@ -377,6 +392,7 @@ class Identification(Estimated):
                 required=self.required,
                 held_out={run.name: fingerprint(run) for run in self.held_out},
                 posterior=self.posterior,
+                key_numbers=self.key_numbers,
             ),
         )
 
@@ -412,24 +428,14 @@ class Identification(Estimated):
             "parameters": parameters,
             "motion": motion_of(self.fit.runs),
             "unreached": self._unreached(),
-            "command": self._logged_command(),
+            "tested": tested_commands(self.fit.runs),
+            "command": logged_command(self.campaign, self.fit.runs[0].axis),
         }
-
-    def _logged_command(self) -> LoggedCommand | None:
-        """How the campaign's logs hold the command, unless as the volts of the card."""
-        axis = self.campaign.axes.get(self.fit.runs[0].axis)
-        if axis is None or axis.input.kind != "voltage":
-            return None
-        entry = axis.input
-        command = LoggedCommand(
-            entry.column, entry.unit or "", entry.scale, entry.offset, entry.sign
-        )
-        return None if command.is_voltage else command
 
     def _unreached(self) -> dict[str, float]:
         """Limits that the fitted runs do not reach; none of a drive that cannot be simulated."""
         try:
-            return unseen_limits(self.fit.stages)
+            return limits_unreached(self.fit.runs, self.fit.drive.parameters)
         except (DomainError, InputError):
             return {}
 
@@ -457,6 +463,37 @@ def parts_of(result: Identification) -> list[tables.FitPart]:
         held_out, _ = folds_tables(result.folds, fit.stages)
         parts.append(tables.FitPart("Cross-validation", [held_out], (), result.folds.sentences()))
     return [part for part in parts if part.tables or part.remarks or part.sentences]
+
+
+def tested_commands(runs: Iterable[Experiment]) -> Commands | None:
+    """Largest command each way of some runs, magnitudes, 0 for a way that none goes. [V]
+
+    To three digits, as more are the log's noise; None if no run is driven by a voltage.
+    """
+    plus, minus = commands_each_way(
+        (float(run.input.values.min()), float(run.input.values.max()))
+        for run in runs
+        if run.input.kind == "voltage"
+    )
+    return (float(f"{plus:.3g}"), float(f"{minus:.3g}")) if plus or minus else None
+
+
+def logged_command(campaign: Campaign, axis: str) -> LoggedCommand | None:
+    """How the logs of a campaign's axis hold the command, unless as the volts of the card."""
+    entry = campaign.axes[axis].input if axis in campaign.axes else None
+    if entry is None or entry.kind != "voltage":
+        return None
+    command = LoggedCommand(entry.column, entry.unit or "", entry.scale, entry.offset, entry.sign)
+    return None if command.is_voltage else command
+
+
+def _number_tables(result: Identification) -> list[Table]:
+    """Table of the numbers that matter; none of a user-defined model."""
+    return [] if result.key_numbers is None else [result.key_numbers.table()]
+
+
+_NONE = KeyNumbers("", (0.0, 0.0), ())
+"""Those of a machine that has none."""
 
 
 def motion_of(runs: Iterable[Experiment]) -> Motion:
@@ -530,6 +567,8 @@ class StoredVerdict(FileTable):
     """Name to fingerprint of each run that was held out."""
     posterior: Posterior | None = None
     """What the fit leaves open of its numbers; None in a file that does not have it."""
+    key_numbers: KeyNumbers | None = None
+    """The numbers that matter of the drive; None of a user-defined model."""
 
     def holds_for(self, result: Identification) -> bool:
         """Whether it is the verdict on these numbers, requirement and runs held out."""

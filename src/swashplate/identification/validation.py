@@ -51,6 +51,11 @@ FOLLOWS = 0.5
 BANDS = 1.35
 """And how many of its 95 % bands it must reach: if a band is wide, about six independent looks
 fit into the lags, and the largest of them stays below that."""
+STILL = 1e-9
+"""Range of a simulated signal over its size, or over the measured range, that is rounding. [1]"""
+WHITE = 1.5
+"""Standard deviation of a signal over that which its steps from sample to sample show, up to which
+it is white noise. [1]"""
 SURE = 0.9
 """A correlation from which no band is asked: in short runs of one slow movement it reaches 1."""
 
@@ -157,7 +162,8 @@ class Measures(NamedTuple):
     rmse: float
     """Root of the mean squared difference, in the channel's unit."""
     spread: float
-    """Standard deviation of what was measured, in the channel's unit."""
+    """Standard deviation of what was measured, in the channel's unit; 0 of a run in which nothing
+    but noise was, and nothing should."""
 
     @property
     def nrmse(self) -> float | None:
@@ -260,7 +266,17 @@ def compared(experiment: Experiment, name: str, simulated: Array) -> RunQuality:
         residual = (simulated - channel.values)[used]
         test = residual_test(time, residual, experiment.input.at(time))
     of_run = measures((channel.values, simulated, channel.weight))
+    if _rests(channel.values[used], simulated[used]):
+        of_run = of_run._replace(spread=0.0)
     return RunQuality(experiment, name, simulated, of_run, test)
+
+
+def _rests(measured: Array, simulated: Array) -> bool:
+    """Whether a signal stands still, simulated and, but for white noise, measured."""
+    if np.ptp(simulated) > STILL * max(float(np.abs(simulated).max()), float(np.ptp(measured))):
+        return False
+    noise = float(np.diff(measured).std()) / 2.0**0.5 if measured.size > FEWEST else 0.0
+    return bool(measured.std() <= WHITE * noise)
 
 
 def predict(

@@ -89,6 +89,8 @@ class ModelOptions(FileTable):
     motion: Motion = "shaft"
     unreached: dict[str, NotNegative] = Field({})
     """Limits that the tests never reached, by column, and how far they went. [SI]"""
+    tested: Annotated[list[NotNegative], Field(min_length=2, max_length=2)] | None = None
+    """Largest command of the tests each way, 0 for a way that none goes; none without tests. [V]"""
 
 
 class CardFile(FormerlyFormat):
@@ -254,6 +256,7 @@ def read_set(text: str, origin: str) -> ParameterSet:
         equations=equations,
         motion=model.motion,
         unreached=model.unreached,
+        tested=None if model.tested is None else (model.tested[0], model.tested[1]),
         command=_logged_command(contents.command, origin),
     )
 
@@ -366,6 +369,8 @@ def _model_entries(parameters: ParameterSet) -> dict[str, object]:
         unreached = inline_table()
         unreached.update(parameters.unreached)
         options["unreached"] = unreached
+    if parameters.tested is not None:
+        options["tested"] = list(parameters.tested)
     return options
 
 

@@ -236,6 +236,9 @@ class ParameterSet(Entries):
     unreached: Mapping[str, float] = field(default_factory=dict)
     """Limits that the tests of this drive never reached, by column, and how far they went, 0 if
     that is not known: such a limit lies there or beyond, wherever its value stands. [SI]"""
+    tested: tuple[float, float] | None = None
+    """Largest command each way of the tests of this drive, magnitudes, 0 for a way that none goes;
+    None of a drive without tests. [V]"""
     command: LoggedCommand | None = None
     """How logs of this drive hold its command; None if they hold the card's volts."""
     numbers: Mapping[str, float] = field(init=False, repr=False, compare=False)

@@ -1,5 +1,6 @@
 from .drive_model import LIMIT_COLUMNS as LIMIT_COLUMNS
 from .drive_model import at_rate_of as at_rate_of
+from .drive_model import limits_unreached as limits_unreached
 from .drive_model import voltage_record as voltage_record
 from .model import states_started_by as states_started_by
 from .model_setup import loaded_module as loaded_module

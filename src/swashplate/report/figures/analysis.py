@@ -28,7 +28,6 @@ from swashplate.analysis import (
 )
 from swashplate.drive import Limit, Simulation
 from swashplate.errors import InputError
-from swashplate.parameters import FULL_VOLTAGE
 from swashplate.report.lines import (
     COLUMNS,
     SHADES,
@@ -79,12 +78,8 @@ from swashplate.units import display_unit
 
 ROOM = 1.12
 """Size of the axes over the range of the speeds."""
-ENVELOPE_LOOKS = (
-    (BLUE, f"+{FULL_VOLTAGE:g} V"),
-    (VERMILION, f"−{FULL_VOLTAGE:g} V"),
-    (FAINT, "let go"),
-)
-"""Colour and name of the two full commands and of the released joystick."""
+ENVELOPE_COLORS = (BLUE, VERMILION, FAINT)
+"""Of the two largest commands and of the released joystick."""
 DASHES: dict[AcceleratedBy, Dashes] = {
     "orifice": "solid",
     "spool stop": "dashed",
@@ -133,7 +128,9 @@ def plot_envelope(
     >>> from swashplate.report.figures import plot_envelope
     >>> plot_envelope(analysis.envelope(Drive.preset("hoist"))).savefig("envelope.png")
     """
-    colors = [handle(name, color) for color, name in ENVELOPE_LOOKS]
+    plus, minus = envelope.largest
+    names = (f"+{plus:.3g} V", f"−{minus:.3g} V", "let go")
+    colors = [handle(name, color) for name, color in zip(names, ENVELOPE_COLORS, strict=True)]
     curves = (*envelope.accelerating, envelope.released)
     drawn = set[str]()
     for curve in curves:
@@ -170,8 +167,8 @@ def _draw_envelope(ax: Axes, envelope: Envelope) -> None:
     span = (high - low) or 1.0
     ax.set_xlim(low - (ROOM - 1.0) * span, high + (ROOM - 1.0) * span)
     largest = []
-    curves = zip((*envelope.accelerating, envelope.released), ENVELOPE_LOOKS, strict=True)
-    for (curve, (color, _)), direction in zip(curves, (1.0, -1.0, 0.0), strict=True):
+    curves = zip((*envelope.accelerating, envelope.released), ENVELOPE_COLORS, strict=True)
+    for (curve, color), direction in zip(curves, (1.0, -1.0, 0.0), strict=True):
         x = speed.factor * curve.speed
         y = acceleration.factor * curve.acceleration
         if direction:  # of a full command only the acceleration in its direction is drawn
@@ -189,12 +186,14 @@ def _draw_envelope(ax: Axes, envelope: Envelope) -> None:
             ax.plot(x[part], y[part], color=color, ls=dashes, lw=width, zorder=order)
     height = 1.3 * max(largest[:2]) or 1.0
     ax.set_ylim(-height, height)
-    for limits, color in ((envelope.plus, BLUE), (envelope.minus, VERMILION)):
-        _mark_direction(ax, limits, color, height)
+    _mark_direction(ax, envelope.plus, envelope.largest[0], BLUE, height)
+    _mark_direction(ax, envelope.minus, envelope.largest[1], VERMILION, height)
 
 
-def _mark_direction(ax: Axes, limits: DirectionLimits, color: str, height: float) -> None:
-    """Mark the top speed of a direction, and its acceleration at rest."""
+def _mark_direction(
+    ax: Axes, limits: DirectionLimits, volts: float, color: str, height: float
+) -> None:
+    """Mark the top speed of a direction under its largest command, and its acceleration at rest."""
     speed_unit = display_unit("rad/s")
     acceleration_unit = display_unit("rad/s^2")
     speed = speed_unit.factor * limits.top_speed
@@ -202,7 +201,7 @@ def _mark_direction(ax: Axes, limits: DirectionLimits, color: str, height: float
     is_positive = limits.acceleration > 0.0
     is_at_swash_stop = limits.top_speed == limits.speed_limit
     sign = "+" if is_positive else "−"
-    cause = "swash stop" if is_at_swash_stop else f"at {sign}{FULL_VOLTAGE:g} V"
+    cause = "swash stop" if is_at_swash_stop else f"at {sign}{volts:.3g} V"
     speed_text = signed(speed, 3 if abs(speed) < 10.0 else 1)
     line = "solid" if is_at_swash_stop else "dotted"
     ax.axvline(speed, color=color, linewidth=1.0, linestyle=line)

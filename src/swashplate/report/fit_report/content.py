@@ -11,8 +11,9 @@ from pathlib import Path
 
 from markupsafe import Markup
 
+from swashplate.analysis import key_numbers as key_numbers_of
 from swashplate.campaign import Campaign, Overview, WeightWindow, examine, quality_table
-from swashplate.drive import Drive
+from swashplate.drive import Drive, KeyNumbers
 from swashplate.errors import InputError
 from swashplate.identification import (
     CrossValidation,
@@ -123,6 +124,7 @@ def write_fit_report(
             result.verdict,
             setup,
             sections,
+            key_numbers=result.key_numbers,
             folder=Path(path).parent,
         )
     write_text(page, path)
@@ -136,6 +138,7 @@ def write_validation_report(
     *,
     verdict: Verdict | None = None,
     notes: Mapping[str, str] | None = None,
+    key_numbers: KeyNumbers | None = None,
 ) -> None:
     """Write the report of a validation: one HTML file, whole or not at all, without network.
 
@@ -153,6 +156,8 @@ def write_validation_report(
         The verdict; made here by default.
     notes : mapping of str to str, optional
         What belongs to the report besides.
+    key_numbers : KeyNumbers, optional
+        The numbers that matter of the drive, with the intervals of its fit; by default without.
 
     Raises
     ------
@@ -167,8 +172,18 @@ def write_validation_report(
     )
     assessed = verdict if verdict is not None else assess_fit((), predicted)
     setup = _setup_section(campaign, drive, "", notes or {}, ())
+    if key_numbers is None and isinstance(drive, ParameterSet):
+        key_numbers = key_numbers_of(Drive(drive))
     content = _page(
-        "Validation", facts, campaign, drive, runs, assessed, setup, folder=Path(path).parent
+        "Validation",
+        facts,
+        campaign,
+        drive,
+        runs,
+        assessed,
+        setup,
+        key_numbers=key_numbers,
+        folder=Path(path).parent,
     )
     write_text(content, path)
 
@@ -189,11 +204,11 @@ def _page(
     setup: Section,
     other_sections: Sequence[Section] = (),
     *,
+    key_numbers: KeyNumbers | None,
     folder: Path,
 ) -> str:
     """A page of a fit, which has sections of its own, or of a drive held against runs."""
     stages = fitted.stages if isinstance(fitted, Fit) else ()
-    drive = fitted.parameters if isinstance(fitted, Fit) else fitted
     nominal = fitted.nominal if isinstance(fitted, Fit) else fitted
     named = f"{'Model' if isinstance(nominal, ModelSetup) else 'Drive'} {nominal.name}"
     if isinstance(nominal, ParameterSet) and nominal.title:
@@ -212,10 +227,9 @@ def _page(
     quality = joined(
         [quality_table(run_qualities, of_run) for run_qualities, of_run in examined.items()]
     )
-    known_drive = Drive(drive) if isinstance(drive, ParameterSet) else None
     sections = [
         summary_section(
-            verdict, campaign, known_drive, stages, runs, len(sentences), folder=folder
+            verdict, campaign, key_numbers, stages, runs, len(sentences), folder=folder
         ),
         _agreement_section(runs, findings, verdict),
         _curves_section(runs, campaign.virtual),

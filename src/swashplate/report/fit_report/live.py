@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from swashplate.analysis import DESIGN_VARIABLES
+from swashplate.analysis import key_numbers as key_numbers_of
 from swashplate.campaign import (
     DIFFERENTIATOR,
     LOW_PASS,
@@ -23,7 +24,7 @@ from swashplate.campaign import (
     Experiment,
     speed_of,
 )
-from swashplate.drive import Drive, Limit
+from swashplate.drive import Drive, KeyNumbers, Limit
 from swashplate.errors import InputError
 from swashplate.export import Exported, content_of, licensed, webassembly
 from swashplate.identification import at_instants, ignored_windows
@@ -34,7 +35,7 @@ from swashplate.machine.marching import Record, inputs_of
 from swashplate.machine.model import full_name
 from swashplate.maneuvers import Maneuver
 from swashplate.parameters import HasParameters, Parameter, ParameterSet, set_of
-from swashplate.report.fit_report.html_page import LIVE_SCRIPTS, rendered, script_json
+from swashplate.report.fit_report.html_page import LIVE_SCRIPTS, html_table, rendered, script_json
 from swashplate.report.fit_report.runs import packed_samples
 from swashplate.report.lines import SHADES, gap_rows
 from swashplate.report.style import in_lines
@@ -93,6 +94,7 @@ def write_live_page(
     command: Maneuver | None = None,
     rate: float = 512.0,
     name: str = "drive.toml",
+    key_numbers: KeyNumbers | None = None,
 ) -> tuple[str, ...]:
     """Write the live page of a drive: one HTML file, whole or not at all, that needs no network.
 
@@ -116,6 +118,8 @@ def write_live_page(
         At which the command is sampled. [Hz]
     name : str
         File that the changed values belong to, for the page's words.
+    key_numbers : KeyNumbers, optional
+        The numbers that matter of the drive, with the intervals of its fit; by default without.
 
     Returns
     -------
@@ -138,6 +142,8 @@ def write_live_page(
     ()
     """
     parameters = set_of(drive)
+    if key_numbers is None:
+        key_numbers = key_numbers_of(Drive(parameters))
     if campaign is not None:
         tests = campaign.select(axis=axis)
         driven = [test for test in tests if test.input.kind == "voltage"]
@@ -159,7 +165,8 @@ def write_live_page(
     else:
         raise InputError("A live page needs the runs of a campaign, or a command to simulate.")
     page = drive_on_page(parameters, runs[0]["step"], name)
-    write_text(live_page(page, runs, title, virtual=virtual), path)
+    content = live_page(page, runs, title, virtual=virtual, key_numbers=key_numbers)
+    write_text(content, path)
     return sentences
 
 
@@ -228,7 +235,12 @@ def write_machine_page(
 
 
 def live_page(
-    page: PageMachine, runs: Sequence[Mapping[str, Any]], title: str, *, virtual: bool = False
+    page: PageMachine,
+    runs: Sequence[Mapping[str, Any]],
+    title: str,
+    *,
+    virtual: bool = False,
+    key_numbers: KeyNumbers | None = None,
 ) -> str:
     """HTML of a live page with runs such as those of `run_of`; see `write_live_page`."""
     present_label = "as fitted" if any(each["main"] for each in page.parameters) else "as it is"
@@ -263,6 +275,8 @@ def live_page(
         limits=[(limit["words"], limit["color"]) for limit in page.limits],
         variables=bool(page.design_variables),
         file=page.file,
+        numbers=html_table(key_numbers.table(), "numbers") if key_numbers else "",
+        said=key_numbers.sentences if key_numbers else (),
     )
 
 
