@@ -53,6 +53,7 @@ from swashplate.identification.estimation.stages import (
     with_estimates,
 )
 from swashplate.identification.estimation.unknowns import Prior
+from swashplate.identification.lateness import is_in_question, lateness_of, with_lateness
 from swashplate.identification.stage_fit import Interval, StageFit
 from swashplate.identification.statistics.intervals import Estimate, uncertainty_of, weighed
 from swashplate.machine import Model as Equations
@@ -83,6 +84,14 @@ TRIAL = 12
 """Evaluations of each other start if the first search was given up."""
 WINDOW = 1.0
 """Time over which the mean speed of a position is taken. [s]"""
+CLIFFS = 2
+"""How often such a search goes on where the cost jumps: where a dead zone passes a level of a
+staircase."""
+WITH_PRIORS = 1e-8
+"""Tolerance of a search in which every number has a prior: what changes the cost by less lies along
+directions that only these hold."""
+BEFORE_WEIGHING = 1e-6
+"""And of the one before it is known what the residuals are worth."""
 FAR = 3.0
 """Deviations beyond which a number is not like that of the named drive: by chance one of 40 is in a
 tenth of fits."""
@@ -331,8 +340,11 @@ def fit(
         refuse_unsound(check_rank(f"Stage {stage.name}", problem), InputError)
         limits: dict[str, Any] = {"tolerance": tolerance, "max_evaluations": max_evaluations}
         with working(f"Stage {stage.name}") as work:
+            if stage.has_spreads:
+                limits |= {"tolerance": max(tolerance, WITH_PRIORS), "cliffs": CLIFFS}
             solve_stage = partial(solve, loss=loss, watch=seen, keep_best=True, **limits)
-            result = _solved(stage, problem, solve_stage, search, doubts)
+            start = problem.unknowns.vector_of(near) if near and stage.has_spreads else None
+            result = _solved(stage, problem, solve_stage, search, doubts, start)
         LOGGER.info(
             "Stage %s: %s after %d evaluations, cost %.5g",
             stage.name,
@@ -343,9 +355,17 @@ def fit(
         return result
 
     with working(f"Fitting {nominal.name}"):
-        runs, between = settle(runs, smooth(nominal), setup, loss=loss, threads=threads)
-        doubts += between
+        settled = settle(runs, smooth(nominal), setup, loss=loss, threads=threads)
+        runs, near = settled.runs, dict(settled.near)
+        doubts += settled.sentences
         stages = staged(setup, nominal, runs, solved, threads=threads)
+        late = {}
+        if is_in_question(setup, nominal):
+            late = lateness_of(stages[0], runs, smooth(nominal))
+        if late:
+            setup = with_lateness(setup)
+            near = stages[0].values | late
+            stages = staged(setup, nominal, runs, solved, threads=threads)
     doubts += tuple(each for stage in stages for each in _unlike(stage, nominal.name))
     return Fit(setup, nominal, tuple(runs), stages, doubts)
 
@@ -470,8 +490,9 @@ def _solved(
     solver: partial[Solution],
     search: Search | None,
     doubts: Sequence[str],
+    start: Array | None = None,
 ) -> SolvedStage:
-    """See `SolvedStage`."""
+    """See `SolvedStage`; a search without other starts begins at `start` if there is one."""
     limits = {key: solver.keywords[key] for key in ("tolerance", "max_evaluations")}
     if search is not None and search.starts:
         solutions = _from_starts(stage, problem, search, limits)
@@ -481,10 +502,12 @@ def _solved(
         hopeless = None
         if search is None and isinstance(problem.model, EquationModel):
             hopeless = partial(_is_hopeless, problem)
-        start = None
-        if stage.has_spreads:
+        if stage.has_spreads and start is None:
             start = approached(problem, loss=solver.keywords["loss"])
-        solution = solver(problem, start, hopeless=hopeless)
+        first = solver
+        if stage.has_spreads:
+            first = partial(solver, tolerance=max(limits["tolerance"], BEFORE_WEIGHING))
+        solution = first(problem, start, hopeless=hopeless)
         solutions = ()
         planned = 1 + OTHERS
     if (

@@ -292,12 +292,22 @@ def windowed(values: Array, weights: Array) -> Array:
     return sums
 
 
-def left_open_over(record: ChannelErrors, window: float) -> Array:
-    """(n, s) errors that are left open over a window about each sample; s is 0 if none is."""
+def left_open_over(record: ChannelErrors, window: float, rows: NDArray[np.intp]) -> Array:
+    """(m, s) errors that are left open over a window about some samples; s is 0 if none is."""
     if record.left_open is None or not record.left_open.size:
-        return np.zeros((record.signal.size, 0))
-    weights = window_weights(record, window)
-    return np.column_stack([windowed(column, weights) for column in record.left_open.T])
+        return np.zeros((rows.size, 0))
+    weights = window_weights(record, window)[::-1]
+    half = weights.size // 2
+    stretches = record.left_open[rows[:, None] + np.arange(-half, half + 1)]
+    return np.asarray(np.einsum("w,mws->ms", weights, stretches))
+
+
+def _rows_of(record: ChannelErrors, window: float, inside: NDArray[np.bool_]) -> NDArray[np.intp]:
+    """Samples about which windows next to each other lie, none of them at an end of the record."""
+    half = window_weights(record, window).size // 2
+    rows = np.flatnonzero(inside)
+    rows = rows[(rows >= half) & (rows < record.signal.size - half)]
+    return rows[:: max(int(window / record.step), 1)]
 
 
 def classes_of(
@@ -374,7 +384,7 @@ def cells_of(records: Iterable[ChannelErrors]) -> tuple[list[WindowCell], float]
                     squares=squares,
                     noise=noise / reach**2,
                     terms=terms,
-                    left_open=left_open_over(record, WINDOWS[motion])[rows] / reach,
+                    left_open=left_open_over(record, WINDOWS[motion], rows) / reach,
                 )
             )
     return cells, max(reach, 0.0)
@@ -541,8 +551,8 @@ def _open_by_class(
         if part.faster:
             continue
         for motion, inside in classes_of(part.record, reach, largest).items():
-            rows = left_open_over(part.record, WINDOWS[motion])[inside] / reach
-            windows[motion].append(rows[np.isfinite(rows).all(axis=1)])
+            rows = _rows_of(part.record, WINDOWS[motion], inside)
+            windows[motion].append(left_open_over(part.record, WINDOWS[motion], rows) / reach)
     return {
         motion: mean_square_bound(np.vstack(parts), BOUND_LEVEL)
         for motion, parts in windows.items()
@@ -553,8 +563,10 @@ def _faster(motions: Sequence[LeftOpen], reach: float) -> FasterError | None:
     """What is left open of the sine that is faster than any test."""
     for part in motions:
         if part.faster:
-            rows = left_open_over(part.record, WINDOWS["fast"]) / reach
-            square = mean_square_bound(rows[np.isfinite(rows).all(axis=1)], BOUND_LEVEL)
+            everywhere = np.ones(part.record.signal.size, np.bool_)
+            rows = _rows_of(part.record, WINDOWS["fast"], everywhere)
+            errors = left_open_over(part.record, WINDOWS["fast"], rows) / reach
+            square = mean_square_bound(errors, BOUND_LEVEL)
             return FasterError(part.faster, float(np.sqrt(square)))
     return None
 

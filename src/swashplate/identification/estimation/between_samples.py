@@ -9,6 +9,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from types import MappingProxyType
+from typing import NamedTuple
 
 import numpy as np
 
@@ -28,7 +30,9 @@ WORDS: Mapping[Between, str] = {
 """The ways, of which the first one is taken if none is better."""
 ENOUGH = 30
 """Evaluations after which a search for the better of two is near enough to its end."""
-ALIKE = 1e-6
+NEAR = 1e-6
+"""Relative change of the cost at which such a search ends."""
+ALIKE = 1e-5
 """Relative difference of costs below which neither is better: no residual depends on the input."""
 CLEARLY = 0.01
 """Part by which residuals must be smaller the other way before what was stated is doubted."""
@@ -39,6 +43,24 @@ def joined(runs: Sequence[Experiment], between: Between) -> tuple[Experiment, ..
     return tuple(replace(run, input=run.input.joined(between)) for run in runs)
 
 
+class Settled(NamedTuple):
+    """Runs of which it is known what their input is between samples."""
+
+    runs: tuple[Experiment, ...]
+    sentences: tuple[str, ...] = ()
+    """On what was taken."""
+    near: Mapping[str, float] = MappingProxyType({})
+    """Values near the optimum of the first stage, by the unknowns' labels; none if unknown."""
+
+
+class _Way(NamedTuple):
+    """The first stage, fitted in one way."""
+
+    cost: float
+    near: Mapping[str, float]
+    """See `Settled`."""
+
+
 def settle(
     runs: Sequence[Experiment],
     nominal: Parameters,
@@ -46,8 +68,8 @@ def settle(
     *,
     loss: Loss = "linear",
     threads: int | None = None,
-) -> tuple[tuple[Experiment, ...], tuple[str, ...]]:
-    """Runs with what their input is between samples settled, and a sentence on what was taken.
+) -> Settled:
+    """Runs with what their input is between samples settled.
 
     The first stage is fitted each way, and the one that leaves the smallest residuals is taken. A
     model that its own code simulates is not tried, as each evaluation may take minutes: its input
@@ -55,23 +77,27 @@ def settle(
     tried either, see `doubt`.
     """
     if all(run.input.settled for run in runs):
-        return tuple(runs), ()
-    costs = _costs(runs, nominal, setup, loss, threads)
-    if costs is None:
-        return joined(runs, "linear"), (
-            "The command is taken as a straight line between samples, without trying others: "
-            f"state interpolation in [axes.{runs[0].axis}.input] if it is held.",
+        return Settled(tuple(runs))
+    ways = _ways(runs, nominal, setup, loss, threads)
+    if ways is None:
+        return Settled(
+            joined(runs, "linear"),
+            (
+                "The command is taken as a straight line between samples, without trying others: "
+                f"state interpolation in [axes.{runs[0].axis}.input] if it is held.",
+            ),
         )
-    better = min(costs, key=lambda between: costs[between])
-    if _smaller(costs[better], max(costs.values())) < ALIKE:
-        return joined(runs, "linear"), ()
+    better = min(ways, key=lambda between: ways[between].cost)
+    if _smaller(ways[better].cost, max(way.cost for way in ways.values())) < ALIKE:
+        return Settled(joined(runs, "linear"), near=ways["linear"].near)
     step = float(np.median([np.median(np.diff(run.input.time)) for run in runs]))
     other: Between = "linear" if better == "previous" else "previous"
     later = "earlier" if better == "previous" else "later"
-    return joined(runs, better), (
+    taken = (
         f"The command is taken as {WORDS[better]}: as {WORDS[other]}, half a sample "
-        f"({500.0 * step:.2g} ms) {later}, it fits worse.",
+        f"({500.0 * step:.2g} ms) {later}, it fits worse."
     )
+    return Settled(joined(runs, better), (taken,), ways[better].near)
 
 
 def doubt(
@@ -84,9 +110,9 @@ def doubt(
 ) -> tuple[str, ...]:
     """A sentence if the input is stated in one way, but the other fits clearly better."""
     stated = runs[0].input.interpolation
-    costs = _costs(runs, nominal, setup, loss, threads) or {stated: 0.0}
-    better = min(costs, key=lambda between: costs[between])
-    smaller = _smaller(costs[better], costs[stated])
+    ways = _ways(runs, nominal, setup, loss, threads) or {stated: _Way(0.0, {})}
+    better = min(ways, key=lambda between: ways[between].cost)
+    smaller = _smaller(ways[better].cost, ways[stated].cost)
     if smaller < CLEARLY:
         return ()
     return (
@@ -96,30 +122,38 @@ def doubt(
     )
 
 
-def _costs(
+def _ways(
     runs: Sequence[Experiment],
     nominal: Parameters,
     setup: FitSetup,
     loss: Loss,
     threads: int | None,
-) -> dict[Between, float] | None:
-    """Cost of the first stage each way, straight lines first; None if a model is not tried."""
-    costs = dict[Between, float]()
+) -> dict[Between, _Way] | None:
+    """The first stage each way, straight lines first; None if a model is not tried.
+
+    Each way begins where the one before ended.
+    """
+    ways = dict[Between, _Way]()
     near = dict[str, float]()
+    first = setup.stages[0]
     sudden = any(run.input.jumps.size for run in runs)
     for between in WORDS if sudden else ("linear", "previous"):
-        problem = stage_problem(setup.stages[0], nominal, joined(runs, between), threads=threads)
+        problem = stage_problem(first, nominal, joined(runs, between), threads=threads)
         if not isinstance(problem.model, EquationModel):
             return None
         try:
-            if setup.stages[0].has_spreads and not near:
+            if first.has_spreads and not near:
                 near = problem.unknowns.values(approached(problem, loss=loss))
             # one way has instants of jumps among its unknowns, another has none
             start = problem.unknowns.vector_of(near)
-            costs[between] = solve(problem, start, loss=loss, max_evaluations=ENOUGH).cost
+            solution = solve(problem, start, loss=loss, tolerance=NEAR, max_evaluations=ENOUGH)
         except DomainError:
             return None  # the fit itself says where the model does not hold
-    return costs
+        found = problem.unknowns.values(solution.vector)
+        ways[between] = _Way(solution.cost, found)
+        if first.has_spreads:
+            near = found
+    return ways
 
 
 def _smaller(cost: float, other: float) -> float:

@@ -220,8 +220,10 @@ class Stage(FileTable):
 
     @property
     def has_spreads(self) -> bool:
-        """Whether each number is known to be near its nominal value: see `stages.whole_drive`."""
-        return self.forces is None and all(entry.spread for entry in self.free.values())
+        """Whether something is known of each number beforehand: see `stages.whole_drive`."""
+        entries = self.free.values()
+        known = all(entry.spread or entry.prior for entry in entries)
+        return self.forces is None and known and any(entry.spread for entry in entries)
 
     def beyond(self, unknown: Unknown, side: int, definitions: Definitions) -> str:
         """What to do about an unknown of the machine at its lower (-1) or upper (1) bound.

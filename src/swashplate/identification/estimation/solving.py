@@ -34,6 +34,13 @@ LEG = 30
 as a step that just reaches the swash plate's stop, it shrinks to nothing."""
 GAINED = 1e-6
 """Relative gain of a leg from which another one is worth it."""
+STUCK = 3
+"""SciPy's ending of a search whose steps became too small."""
+CLIFF, JUMP = 1e-4, 1e-6
+"""Change of one of the solver's numbers by which it is tried whether the cost jumps there, and the
+relative jump that counts."""
+RCOND = 1e-10
+"""Relative singular value below which a direction is left alone."""
 REVIVALS = 3
 """How often unknowns that lost their effect are given one again."""
 NO_EFFECT = 1e-12
@@ -149,6 +156,7 @@ def solve(
     watch: Callable[[Progress], None] | None = None,
     hopeless: Callable[[Array], bool] | None = None,
     keep_best: bool = False,
+    cliffs: int = 0,
 ) -> Solution:
     """The optimum next to a start: half the sum of squares minimised within the bounds.
 
@@ -173,6 +181,9 @@ def solve(
     keep_best : bool
         At Ctrl-C return the best point so far, a `Solution` that is `interrupted`, instead of
         passing it on. Whoever asks for it must look: taken for an optimum, the Ctrl-C is lost.
+    cliffs : int
+        How often a search that stands before a jump of the cost goes on without the unknowns that
+        would cross it.
 
     Returns
     -------
@@ -227,7 +238,7 @@ def solve(
     revivals = 0
     lowest_at_revival = np.inf
     # After an unknown without effect was moved to where it has one, it is paused for one leg, while
-    # the others adapt.
+    # the others adapt; so is one that stands at a cliff of the cost.
     paused = np.zeros(begin.size, dtype=bool)
     try:
         while True:
@@ -265,6 +276,10 @@ def solve(
                 lowest_at_revival = lowest
                 if point is not None:
                     revivals += 1
+            if point is None and ending == STUCK and cliffs > 0:
+                cliffs -= 1
+                paused = _at_cliffs(memory, best)
+                point = best if paused.any() else None
             if point is None and not (released or (ending == 0 and gained)):
                 ending = ending or UNCHANGED
                 break
@@ -283,6 +298,33 @@ def solve(
         message=_ENDINGS[ending],
         loss=loss,
     )
+
+
+def _at_cliffs(memory: _Memory, vector: Array) -> NDArray[np.bool_]:
+    """Unknowns along which the cost jumps up right where a search stopped, though it ought to fall.
+
+    A dead zone that moves past a level of a staircase, or a rule between two numbers, is such a
+    cliff: the region that the search trusts shrinks to nothing before it, for all unknowns alike.
+    None if the others have little to gain.
+    """
+    residuals, jacobian = memory(vector)
+    step = np.linalg.lstsq(jacobian, -residuals, rcond=RCOND)[0]
+    squares = float(residuals @ residuals)
+    at_cliff = np.zeros(vector.size, np.bool_)
+    if squares - float(np.sum((residuals + jacobian @ step) ** 2)) < GAINED * squares:
+        return at_cliff
+    gradient = jacobian.T @ residuals
+    low, high = memory.bounds
+    for k, slope in enumerate(gradient.tolist()):
+        trial = vector.copy()
+        trial[k] = min(max(vector[k] - CLIFF * np.sign(slope), low[k]), high[k])
+        expected = 0.5 * squares + slope * (trial[k] - vector[k])
+        try:
+            cost = memory.problem.cost(memory.full(trial))
+        except DomainError:
+            cost = np.inf
+        at_cliff[k] = cost > max(expected, 0.5 * squares) * (1.0 + JUMP)
+    return at_cliff
 
 
 def _with_effect_again(memory: _Memory, vector: Array) -> tuple[Array | None, NDArray[np.bool_]]:
