@@ -1,6 +1,7 @@
 """``fit``, ``validate``, ``report`` and ``demo``: from tests to a drive, its verdict, its page."""
 
 import csv
+import json
 import os
 import re
 import shlex
@@ -87,6 +88,23 @@ def test_a_campaign_becomes_a_drive(done, refused, campaign, tmp_path, monkeypat
     ranked = done("advise", "../virtual/campaign.toml", "--drive", "drive.toml", "--top", "30")
     assert "step 4 V" in ranked
     assert "step 9 V" not in ranked
+    # whoever designs a controller by it hears what its verdict has found
+    monkeypatch.chdir(tmp_path)
+    words = ("linearize", "fitted", "--at", "4")
+    assert "The fit of this drive says" not in done(*words)
+    stored = tmp_path / "fitted" / "fit.json"
+    content = json.loads(stored.read_text("utf-8"))
+    late = ["late", 0.0976, 0.9, "encoder_counts is 97.6 ms late", "compare its clock"]
+    content["verdict"]["verdict"]["causes"] = [late]
+    stored.write_text(json.dumps(content), "utf-8")
+    sweep = ("bode", "fitted", "--amplitude", "4", "--bias", "4", "--from", "0.3")
+    for each in (words, (*sweep, "--to", "1", "--points", "2"), ("export", "fitted", "--c", "c")):
+        said = done(*each)
+        assert "! The fit of this drive says: Not all of its error is noise. " in said
+        assert "encoder_counts is 97.6 ms late" in said
+    # a file apart from its fit has no verdict
+    (tmp_path / "fitted" / "drive.toml").rename(tmp_path / "alone.toml")
+    assert "says" not in done("linearize", "alone.toml", "--at", "4")
 
 
 @pytest.mark.slow
@@ -201,6 +219,12 @@ def test_a_result_that_is_of_no_use_ends_with_1(run, campaign, tmp_path) -> None
     # whoever takes the drive along hears of it, and so do those who get the files
     said = run("export", "fitted", "--c", "folder").stdout
     assert "! The fit of this drive says: Not usable: " in said
+    for words in ("linearize fitted --at 4", "bode fitted --amplitude 4 --points 2 --bias 4"):
+        said = run(*words.split())
+        assert said.stdout.startswith("! The fit of this drive says: Not usable: ")
+        assert said.exit_code == 0
+    headline = Drive.from_toml(tmp_path / "fitted" / "drive.toml").linearize(4.0).headline
+    assert headline.startswith("The fit of this drive says: Not usable: ")
     (values,) = (tmp_path / "folder").glob("*_values.h")
     assert "Not usable: " in values.read_text("utf-8")
 

@@ -31,6 +31,8 @@ REFINEMENTS = {
     "Z12": 0.003,
     "spool_friction": 0.05,
     "spool_presliding": 2e-6,
+    "solenoid_delay": 0.0123,
+    "solenoid_lag": 0.015,
     "solenoid_hysteresis": 0.01,
     "swash_damping": 0.004,
     "cam_ripple": 0.02,

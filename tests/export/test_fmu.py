@@ -163,6 +163,7 @@ def stepped(drive: Drive, voltage: Any, h: float = H, **options: Any) -> np.ndar
 REFINED = {
     **{"Z7": 0.4, "Z12": 0.003, "spool_friction": 0.05, "spool_presliding": 2e-6},
     **{"solenoid_hysteresis": 0.01, "swash_damping": 0.004, "cam_ripple": 0.02},
+    **{"solenoid_delay": 0.0401, "solenoid_lag": 0.015},
 }
 
 

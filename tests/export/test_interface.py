@@ -149,6 +149,7 @@ TERMS: dict[str, dict[str, float]] = {
     "line": {"load_inertia": 5e3, "line_stiffness": 1e6},
     "line after friction": {"spool_friction": 0.1, "load_inertia": 5e3, "line_stiffness": 1e6},
     "hysteresis": {"solenoid_hysteresis": 0.005},
+    "lateness": {"solenoid_delay": 0.04, "solenoid_lag": 0.2},
     "friction": {"spool_friction": 0.1},
     "leakage": {"Z7": 1e-6},
 }

@@ -11,6 +11,7 @@ import pytest
 from tests.drive.test_own_equation import DRAGGED
 from tests.export.conftest import InC
 from tests.export.webassembly import Page
+from tests.machine import test_taps_between
 from tests.machine.test_own_model import COMMAND, STROKE, P, valve
 from tests.marks import rest_slow
 
@@ -268,6 +269,18 @@ def test_a_model_has_the_bits_of_its_march(case: Any, compiled: Any) -> None:
     for output, values in found.run(command, outputs.split()).items():
         assert np.ptp(values) > 0.1, output
         assert (run[output] == values).all(), output
+
+
+@pytest.mark.parametrize("start", ["rest", "steady"])
+def test_past_samples_of_signals_between_parts_have_the_bits_of_the_march(
+    start: str, compiled: Any
+) -> None:
+    own, command = test_taps_between.machine(), test_taps_between.COMMAND + 0.7
+    run = simulate(own, {"command": command}, 1.0 / test_taps_between.H, start=start)
+    found = exported(own, compiled, 1.0 / test_taps_between.H)
+    if start == "steady":
+        assert found.settle(float(command[0])) == 0
+    assert np.array_equal(found.run(command, ["out"])["out"], run["out"])
 
 
 class Numbered(NamedTuple):

@@ -185,28 +185,32 @@ def test_two_most_visible_masses_are_found() -> None:
 
 STICTION = {"spool_friction": 0.115, "spool_presliding": 5e-5, "dither_time": 0.6}
 LOAD = {"load_torque": 3e4, "load_inertia": 5e3, "motor_leakage": 1e-6}
+LATE = {"solenoid_delay": 0.04, "solenoid_lag": 0.015}
 CAM = {"cam_ripple": 0.02, "cam_cycles": 5.5, "cam_phase": 0.7}
 ALL = {
     **STICTION,
     **LOAD,
     **CAM,
+    **LATE,
     "solenoid_hysteresis": 0.01,
     "swash_damping": 0.03,
     "line_stiffness": 1e6,
 }
-WITHOUT_LINE = {**LOAD, "solenoid_hysteresis": 0.01, "cam_ripple_per_torque": 1e-6}
+WITHOUT_LINE = {**LOAD, **LATE, "solenoid_hysteresis": 0.01, "cam_ripple_per_torque": 1e-6}
 """A leakage that goes with the flow's acceleration, and a ripple that goes with the load."""
 OFF = {"cam_cycles": 1.01}
 """How far off a fit starts: 15 %, but no more than a quarter turn of the ring's phase in a run."""
 REACH = {
     "load_inertia": (1e3, 2e4),
     "motor_leakage": (0.0, 1e-5),
+    "solenoid_delay": (0.0, 0.2),
+    "solenoid_lag": (0.0, 0.2),
     "solenoid_hysteresis": (0.0, 0.05),
     "cam_ripple_per_torque": (0.0, 1e-5),
 }
 
 
-SWITCHED = ("solenoid_hysteresis", "cam_ripple_per_torque")
+SWITCHED = (*LATE, "solenoid_hysteresis", "cam_ripple_per_torque")
 
 
 def recorded(truth: Drive, path: Path, channel: ChannelKind) -> Campaign:
@@ -223,7 +227,7 @@ def fitted(campaign: Campaign, start: Drive, stage: Stage) -> StageFit:
 
 @pytest.mark.slow
 def test_all_refinements_are_recovered_at_once(tmp_path: Path) -> None:
-    """Friction, hysteresis, damping, cam ring, leakage and line, with Z1, from a position alone."""
+    """Friction, lateness, hysteresis, damping, ring, leakage, line, with Z1, from a position."""
     truth = Drive.preset("hoist").replace(**ALL)
     names = ["Z1", *(name for name in ALL if name != "load_torque")]
     start = truth.scale(**{name: OFF.get(name, 1.15) for name in names})
@@ -245,7 +249,7 @@ def test_what_is_on_is_found_from_beside_it_and_from_nothing(begin: str, tmp_pat
     if begin == "switched off":
         changes |= dict.fromkeys(SWITCHED, 0.0)
     start = truth.replace(**changes).scale(Z1=1.05)
-    on = {"leakage"} if begin == "switched off" else {"leakage", "hysteresis", "ripple"}
+    on = {"leakage"} if begin == "switched off" else {"leakage", "late", "hysteresis", "ripple"}
     assert start.parameters.options == on
     found = fitted(recorded(truth, tmp_path, "shaft_speed"), start, without_line())
     for name in REACH:
@@ -256,9 +260,13 @@ def test_what_is_on_is_found_from_beside_it_and_from_nothing(begin: str, tmp_pat
 def test_what_is_not_there_goes_to_next_to_nothing(tmp_path: Path) -> None:
     """It stays on, at the least that its equations take: what is off has no derivative."""
     truth = Drive.preset("hoist").replace(**LOAD)
-    start = Drive.preset("hoist").replace(**WITHOUT_LINE).scale(Z1=1.05, motor_leakage=1.15)
-    found = fitted(recorded(truth, tmp_path, "shaft_speed"), start, without_line())
-    for name in SWITCHED:
+    changes = WITHOUT_LINE | dict.fromkeys(LATE, 0.0)
+    start = Drive.preset("hoist").replace(**changes).scale(Z1=1.05, motor_leakage=1.15)
+    stage = without_line()
+    for name in LATE:  # it is like what leaks while the load accelerates, but for the last digits
+        del stage.free[name]
+    found = fitted(recorded(truth, tmp_path, "shaft_speed"), start, stage)
+    for name in ("solenoid_hysteresis", "cam_ripple_per_torque"):
         least = REFINEMENTS[name].least
         assert least is not None
         assert least <= found.values[name] < 1e-5 * WITHOUT_LINE[name], name
@@ -266,6 +274,30 @@ def test_what_is_not_there_goes_to_next_to_nothing(tmp_path: Path) -> None:
     # the hysteresis that is left, 1e-8 A, shows in the sixth digit of the others
     for name in ("Z1", "motor_leakage", "load_inertia"):
         assert found.values[name] == pytest.approx(truth[name].value, rel=1e-5), name
+
+
+@pytest.mark.parametrize("delay", [0.0, 0.04])
+def test_how_late_a_drive_is_behind_its_current(delay: float, tmp_path: Path) -> None:
+    """With the amplifier's delay, from an ammeter and an encoder; nothing is invented."""
+    truth = Drive.preset("hoist").replace(solenoid_delay=delay, solenoid_lag=0.375 * delay)
+    start = Drive.preset("hoist").replace(solenoid_delay=0.03, solenoid_lag=0.01).scale(Z1=1.05)
+    tests = [
+        *(maneuvers.step(volts, stop=3.0, length=5.0) for volts in (4.0, -6.0)),
+        *(maneuvers.sine(volts, f, length=7.0) for volts, f in ((4.0, 0.3), (6.0, 1.0))),
+    ]
+    channels = ("rectified_current", "encoder_counts")
+    campaign = virtual(
+        tmp_path, "hoist", tests, severity="realistic", truth=truth, channels=channels
+    )
+    free = {name: Free(bounds=(0.0, 0.2)) for name in (*LATE, "tau")}
+    free |= {name: Free(relative=(0.5, 2.0), log=True) for name in ("Z1", "Z8")}
+    setup = FitSetup(stages=(Stage(name="drive", part="chain", free=free),))
+    (stage,) = fit(start.parameters, campaign.experiments, setup).stages
+    assert stage.values["solenoid_delay"] == pytest.approx(delay, abs=5e-4)
+    assert stage.values["solenoid_lag"] == pytest.approx(0.375 * delay, abs=1e-3)
+    assert stage.values["tau"] == pytest.approx(truth["tau"].value, abs=1e-3)
+    found, known = (drive.linearize(4.0).largest_gain for drive in (Drive(stage.parameters), truth))
+    assert found == pytest.approx(known, rel=0.03)
 
 
 def without_line() -> Stage:

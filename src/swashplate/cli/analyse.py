@@ -619,6 +619,7 @@ def linearize(
     save(out, "Model, in SI", model.write)
     sampled = "" if sample_time is None else f", sampled at {sample_time:g} s"
     motions = f"small motions of the {model.input.replace('_', ' ')}{sampled}"
+    machine.warn_of_fit()
     machine.note(f"{machine.title}, {motions}")
     for switch in model.operating_point.one_sided:
         note(f"One-sided at the {switch}.")
@@ -762,6 +763,7 @@ def bode(
     span = f"{grid.size} frequencies from {grid[0]:g} to {grid[-1]:g} Hz"
     about = f"{bias:g} {unit_text(response.units.get(response.input, ''))}".rstrip()
     moved = "" if machine.own is None else f" of {response.input} to {response.output}"
+    machine.warn_of_fit()
     machine.note(f"{machine.title}, sines{moved} about {about}: {span}")
     if machine.own is None:
         note(f"At {frequency:g} Hz:")

@@ -260,11 +260,17 @@ class DriveChoice:
         return changes_between(self.named_drive.parameters, self.loaded_drive.parameters)
 
     def warn(self) -> None:
-        """Say it if the drive's fit calls it not usable, as its title does, or left limits open."""
-        _, marked, why = self.loaded_drive.parameters.title.partition("Not usable")
-        if marked:
-            note(f"! The fit of this drive says: {marked}{why}.")
+        """Say what speaks against the drive's fit, and which limits its tests left open."""
+        self.warn_of_fit()
         self._warn_unreached()
+
+    def warn_of_fit(self) -> None:
+        """Say what speaks against the drive's fit, as its verdict has it."""
+        from swashplate.cli.parsing import doubt_of
+
+        doubt = doubt_of(self.drive, self.named_drive)
+        if doubt:
+            note(f"! The fit of this drive says: {doubt}")
 
     def _warn_unreached(self) -> None:
         sentence = self.loaded_drive.parameters.unreached_sentence()
@@ -332,6 +338,11 @@ class MachineChoice(DriveChoice):
         """Say what speaks against a drive; nothing is known of a machine of a user's own."""
         if self.own is None:
             super().warn()
+
+    def warn_of_fit(self) -> None:
+        """Say what speaks against a drive's fit; nothing is known of a machine of a user's own."""
+        if self.own is None:
+            super().warn_of_fit()
 
     def refuse_without(self, lacking: str, **options: object) -> None:
         """Refuse options that are given, by name, as something lacks that they need."""

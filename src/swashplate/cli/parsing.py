@@ -244,6 +244,25 @@ def key_numbers_of(word: str, drive: Drive) -> KeyNumbers:
     return (stored and stored.key_numbers) or key_numbers(drive)
 
 
+def doubt_of(word: str, drive: Drive) -> str:
+    """What speaks against the fit that a drive comes from, as its verdict says; empty if nothing.
+
+    That is its headline if it is not usable, else what would explain the error that is not noise,
+    else the first of what asks for attention.
+    """
+    file = drive_file(word)
+    if file is None or not file.with_name(FIT_FILE).is_file():
+        return drive.parameters.doubt
+    verdict = verdict_of_fit(str(file), drive.parameters.numbers)
+    if verdict is None:
+        return drive.parameters.doubt
+    if not verdict.usable:
+        return verdict.headline
+    if verdict.causes:
+        return f"Not all of its error is noise. It would be explained by {verdict.cause}"
+    return verdict.remarks[0] if verdict.remarks else ""
+
+
 # --- changes and design variables -----------------------------------------------------------------
 
 

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final, NamedTuple, Protocol
+from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
 
 from swashplate.crane.axes import AXES
 from swashplate.documents import parse_toml, read_text
 from swashplate.drive import Drive
 from swashplate.errors import ParameterError, SwashplateError
+from swashplate.parameters import UNUSABLE as UNUSABLE
 from swashplate.parameters import preset_names
 
 if TYPE_CHECKING:
@@ -17,8 +18,6 @@ if TYPE_CHECKING:
 
 DRIVE_FILE, FIT_FILE = "drive.toml", "fit.json"
 """Files in the folder of a fit: the drive, and the fit itself with its verdict."""
-UNUSABLE: Final = "Not usable"
-"""Beginning of the verdict on a fit that is not usable; the title of such a drive has it."""
 
 
 class Fitted(Protocol):
@@ -133,7 +132,7 @@ def _source(drive_like: DriveLike, drive: Drive, path: Path | None) -> DriveSour
         return _source_of_file(path, drive)
     if isinstance(drive_like, str | Path):
         return None
-    stated = _stated_in_title(drive)
+    stated = drive.parameters.doubt
     if isinstance(drive_like, Drive):
         if not stated:
             return None
@@ -168,7 +167,7 @@ def _source_of_file(path: Path, drive: Drive) -> DriveSource:
         verdict, unknown_because = _stored_verdict(stored, drive)
         if verdict is not None:
             return _assessed_source(str(path), fit, verdict)
-    stated = _stated_in_title(drive)
+    stated = drive.parameters.doubt
     if stated:
         return DriveSource(str(path), fit=fit, fit_usable=False, verdict=stated)
     return DriveSource(str(path), fit=fit, fit_usable=None, verdict=unknown_because)
@@ -188,9 +187,3 @@ def _stored_verdict(path: Path, drive: Drive) -> tuple[Verdict | None, str]:
     if stored.numbers != dict(drive.parameters.numbers):
         return None, f"it is not the drive that {path} was written with"
     return stored.verdict, ""
-
-
-def _stated_in_title(drive: Drive) -> str:
-    """The verdict that the title of a drive which is not usable has, else an empty text."""
-    _, stated, reason = drive.parameters.title.partition(UNUSABLE)
-    return f"{stated}{reason.rstrip('.')}." if stated else ""

@@ -46,6 +46,12 @@ class LinearDrive(LinearModel, Result):
 
     __repr__ = LinearModel.__repr__
 
+    @property
+    def headline(self) -> str:
+        """What the fit that the drive comes from says against it; empty if that is usable."""
+        doubt = self.parameters.doubt
+        return f"The fit of this drive says: {doubt}" if doubt else ""
+
     def tables(self) -> list[Table]:
         """Operating point, small motion and poles, as of `model_tables`."""
         return model_tables(self, SHOWN_AT)

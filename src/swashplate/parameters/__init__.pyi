@@ -22,6 +22,7 @@ from .files import parameter_of as parameter_of
 from .files import preset_names as preset_names
 from .files import read_set as read_set
 from .files import set_file as set_file
+from .parameter_set import UNUSABLE as UNUSABLE
 from .parameter_set import Change as Change
 from .parameter_set import Entries as Entries
 from .parameter_set import HasParameters as HasParameters

@@ -35,6 +35,8 @@ PressureRoot = Literal["published", "symmetric"]
 CoulombSign = Literal["smooth", "literal"]
 CardSwitch = Literal["sampled", "split"]
 Motion = Literal["shaft", "rod"]
+UNUSABLE = "Not usable"
+"""Beginning of the verdict on a fit that is not usable; the title of such a drive has it."""
 Status = Literal["fitted", "fixed", "assumed", "approximate", "inactive", "user"]
 
 
@@ -318,6 +320,15 @@ class ParameterSet(Entries):
         parameters = {symbol: self.parameters[symbol] for symbol in CATALOGUE}
         switches = {SWITCHES[symbol] for symbol in CATALOGUE if symbol in SWITCHES}
         return replace(self, parameters=parameters, options=self.options & switches, equations=())
+
+    @property
+    def doubt(self) -> str:
+        """The verdict on the fit that it comes from, if that is not usable; else empty.
+
+        Its title has it.
+        """
+        _, stated, reason = self.title.partition(UNUSABLE)
+        return f"{stated}{reason.rstrip('.')}." if stated else ""
 
     def unreached_sentence(self, drive: str = "this drive") -> str:
         """Say what the tests of a drive left open; empty if nothing. `drive` is its name there."""
