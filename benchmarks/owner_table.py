@@ -1,4 +1,4 @@
-"""Whether the intervals of a report's table "Numbers that matter" hold, over 40 winches.
+"""Whether the intervals of the numbers that matter hold, over 40 winches.
 
     .venv/bin/python benchmarks/owner_table.py [--winches 40] [--jobs 1] [--folder FOLDER]
 
@@ -55,8 +55,7 @@ each four. [1]"""
 COUNTS = (300.0, 3000.0)
 """Counts a second of the encoder at the top speed, log-uniform, of the others. [1/s]"""
 
-WAYS = ("positive", "negative")
-QUANTITIES = ("dead zone", "top speed", "acceleration", "delay", "lag", "creep")
+QUANTITIES = ("dead_zone", "gain", "jump", "top_speed", "acceleration", "delay", "lag", "creep")
 FIELDS = (
     *("seed", "sensor", "orifice", "quantity", "way"),
     *("truth", "printed", "low", "high", "usable", "fit_cpu"),
@@ -112,7 +111,7 @@ def draw(seed):
         "Z13": tuple(tops / per_angle),
         "Z16": tuple(pulls),
     }
-    orifice = "both" if seed % 2 == 0 else WAYS[1 - without]
+    orifice = "both" if seed % 2 == 0 else ("plus", "minus")[1 - without]
     drive = Drive.preset("neutral").replace(**changes).renamed("winch", f"Winch {seed}")
     largest = random.uniform(*LARGEST, 2)
     if seed % 4 < 2:
@@ -211,60 +210,35 @@ def fitted(seed, folder):
 
 
 def rows_of(folder, seed):
-    """Rows of a winch's table: a quantity one way, with the truth and what is printed."""
-    from swashplate.report.fit_report.summary import (
-        largest_commands,
-        machine_numbers_of,
-        numbers_table,
-    )
-    from swashplate.units import display_unit
+    """Rows of a winch's table: a quantity one way, with the truth, what is shown, its ends."""
+    from dataclasses import replace
+
+    from swashplate import Drive
+    from swashplate.analysis import key_numbers
 
     drive, _, sensor, orifice = draw(seed)
     place = Path(folder) / f"{seed:02d}"
     judged = fitted(seed, place)
-    result = judged.fit
-    largest = largest_commands(result.stages)
-    truth, values = machine_numbers_of(drive, largest), machine_numbers_of(result.drive, largest)
-    table, _ = numbers_table(result.drive, result.stages)
+    numbers = key_numbers(judged.fit)
+    tested = replace(drive.parameters, tested=numbers.commands)
+    truth = key_numbers(Drive(tested))
     seconds = (place / "seconds.txt").read_text("utf-8").strip()
+    usable = judged.verdict.usable
     rows = []
-    for name, entry, true, value in zip(QUANTITIES, table.rows, truth, values, strict=True):
-        factor = display_unit(entry.unit, float(np.nanmax(np.abs(value), initial=0.0))).factor
-        for way, cell, exact in zip(WAYS, entry.cells[1:3], true, strict=True):
-            if name == "creep" and way == "negative":
-                continue
-            printed = cell if isinstance(cell, str) else cell.text
-            low, high = ends(printed)
-            words = (seed, sensor[0], orifice, name, way)
-            rows.append(
-                (*words, factor * exact, printed, low, high, judged.verdict.usable, seconds)
-            )
+    for number in numbers.numbers:
+        low, high = ("" if end is None else end for end in number.interval)
+        words = (seed, sensor[0], orifice, number.name, number.direction)
+        true = truth[number.label].value
+        rows.append((*words, true, number.text(), low, high, usable, seconds))
     return rows
 
 
-def ends(printed):
-    """Ends of what a cell promises: of an interval both, of "at least" and "at most" one."""
-    if "±" in printed:
-        value, half = (float(part.split()[0]) for part in printed.split("±"))
-        return value - half, value + half
-    if printed.startswith("at least"):
-        return float(printed.split()[2].rstrip(",")), ""
-    if printed.startswith("at most"):
-        return "", float(printed.split()[2].rstrip(","))
-    return "", ""
-
-
 def holds(row):
-    """Whether a truth lies within the ends of a row; None if nothing is promised.
-
-    One end alone is of the size, whatever the direction.
-    """
+    """Whether a truth lies within the ends of a row; None if nothing is promised."""
     truth, low, high = float(row["truth"]), row["low"], row["high"]
-    if low and high:
-        return float(low) <= truth <= float(high)
-    if low:
-        return abs(truth) >= abs(float(low))
-    return abs(truth) <= abs(float(high)) if high else None
+    if not low and not high:
+        return None
+    return (not low or float(low) <= truth) and (not high or truth <= float(high))
 
 
 def report(rows):
@@ -309,7 +283,7 @@ def main():
     rows = []
     for _, some in Processes(chosen.jobs).run(rows_of, str(chosen.folder), list(seeds)):
         rows += [dict(zip(FIELDS, map(str, row), strict=True)) for row in some]
-        print(f"\r{len(rows) // 11} of {len(seeds)} ", end="", file=sys.stderr, flush=True)
+        print(f"\r{len(rows) // 15} of {len(seeds)} ", end="", file=sys.stderr, flush=True)
     print(file=sys.stderr)
     rows.sort(key=lambda row: int(row["seed"]))
     with (chosen.folder / "rows.csv").open("w", newline="", encoding="utf-8") as stream:

@@ -368,14 +368,13 @@ def test_truth_stands_beside_the_estimates(write, judged: Identification, read: 
 
 
 @pytest.mark.slow
-def test_a_number_of_fixed_parameters_alone_says_so(campaign: Campaign) -> None:
+def test_a_creep_and_a_way_that_no_test_shows_say_so(campaign: Campaign) -> None:
     still = Drive.preset("hoist").replace(Z11=0.0, Z18=0.0)
     found = fit(still, campaign.select(role="fit"), SETUP)
     numbers = analysis.key_numbers(found)
     assert numbers["creep"].text() == "0 (not seen)"
-    # the dead zone is that of V_dz, Z17 and the jump
-    assert numbers["dead_zone_minus"].note == "fixed"
     assert "±" in numbers["top_speed_plus"].text()
+    assert numbers["top_speed_minus"].note == "not tested"
 
 
 def test_the_first_screen_is_for_the_owner(read: Page, fitted: Fit, validated: Path) -> None:
@@ -383,9 +382,9 @@ def test_the_first_screen_is_for_the_owner(read: Page, fitted: Fit, validated: P
     drive = fitted.drive
     top, dead_zone = rows["Top speed"], rows["Dead zone"]
     plus, minus = analysis.key_numbers(fitted).commands
-    commands = [run.input.values for run in fitted.runs]
-    assert plus == pytest.approx(max(volts.max() for volts in commands), abs=0.005)
-    assert minus == pytest.approx(-min(volts.min() for volts in commands), abs=0.005)
+    largest = max(float(run.input.values.max()) for run in fitted.runs)
+    # no fitted run goes the other way
+    assert plus == minus == pytest.approx(largest, abs=0.005)
     assert top["unit"] == "deg/s"
     for way, head in ((plus, "positive"), (-minus, "negative")):
         settled = np.degrees(drive.simulate(np.full(8192, way), 512.0).shaft_speed[-1])

@@ -3,7 +3,7 @@
 import tomllib
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from math import inf
+from math import inf, sqrt
 from pathlib import Path
 from types import MappingProxyType
 
@@ -109,7 +109,7 @@ def test_the_top_speed_is_that_of_the_largest_command_that_was_tested(found: Fit
         seen = float(WINCH.steady_speed(volts))
         slack = 0.25 * (high - low)
         assert low - slack <= seen <= high + slack
-    assert "at 8 and -7 V" in str(numbers.table())
+    assert "steps from rest to 8 and -7 V" in " ".join(numbers.sentences)
 
 
 @pytest.mark.slow
@@ -144,7 +144,12 @@ def test_an_estimate_at_its_bound_keeps_its_interval_and_is_named(
     numbers = key_numbers(result)
     for number in numbers.numbers:
         assert number.name in ("jump", "creep") or None not in number.interval, number.label
-    assert "V_dz_minus at its bound" in texts(result)["dead_zone_minus"]
+    assert numbers["dead_zone_minus"].note == "V_dz_minus at its bound"
+    assert texts(result)["dead_zone_minus"].endswith(" *")
+    assert any("V_dz_minus" in sentence for sentence in numbers.basis)
+    # its error is at most what a uniform distribution between the bounds has
+    low, high = numbers["dead_zone_minus"].interval
+    assert high - low <= 2.0 * 1.96 * (bounds[1] - bounds[0]) / sqrt(12.0)
     assert numbers["dead_zone_plus"].note == numbers["acceleration_plus"].note == ""
 
 

@@ -53,7 +53,7 @@ SHOWN_LIMITS = 3
 
 
 class _Kind(NamedTuple):
-    """A number that a drive has each way, in the order of the rows of `_numbers_of`."""
+    """A number that a drive has each way, in the order of the rows of `_Values.of`."""
 
     name: str
     unit: str
@@ -213,12 +213,12 @@ class _Values:
         directions: tuple[Direction, Direction] = ("plus", "minus")
         for row, kind in enumerate(KINDS):
             factor, unit = 1.0, kind.unit
+            if self.drive.parameters.motion == "rod":
+                unit = unit.replace("rad", "m")
             if kind.of_command:
                 factor = per_volt**kind.of_command
                 factor = abs(factor) if row in UNSIGNED else factor
                 unit = unit.replace("V", command_unit(stick))
-            if self.drive.parameters.motion == "rod":
-                unit = unit.replace("rad", "m")
             for side, direction in enumerate(directions):
                 if row == CREEP and side:
                     continue
@@ -349,29 +349,35 @@ def _with_fit(
         at_ends = spread_of(stages, lambda varied: flat(_at_limits(varied, unseen)), tuple(unseen))
         cautious = at_ends.half.reshape(shape) * np.where(far > near, -1.0, 1.0)
         _one_sided(found, near + cautious, far, left_open)
-        found.notes[left_open] = ""
         # what depends only on an estimate without an upper end has a value all the same
-        never = drive.parameters.unreached
-        closest, farthest = (
-            values.of(_at_limits(drive, never)),
-            values.of(without_limits(drive, never)),
-        )
-        found.notes[left_open & (np.abs(farthest - closest) > OPEN * np.abs(closest))] = NOT_SEEN
-    for side, column in enumerate(("Z16_plus", "Z16_minus")):
-        if _mistaken_for_a_lag(column, stages, unseen):
-            # the lag is the same both ways, and the delay follows it
-            rows = [(ACCELERATION, side), *((row, way) for row in (DELAY, LAG) for way in (0, 1))]
-            for row, way in rows:
-                found.notes[row, way] = f"{column} fixed"
-                found.lower[row, way] = found.upper[row, way] = np.nan
+        found.notes[left_open] = ""
+        found.notes[left_open & _decided_by_unreached(drive, values)] = NOT_SEEN
+    _doubt_lag(found, stages, unseen)
     _notes(values, found)
-    remarks = []
-    if assumed_parameters(stages):
-        remarks.append(
-            f"Assumed parameters are taken as known to {100.0 * ERROR_OF_ASSUMED:.0f} % (standard "
-            "deviation)."
-        )
-    return found, remarks
+    if not assumed_parameters(stages):
+        return found, []
+    known = f"{100.0 * ERROR_OF_ASSUMED:.0f} % (standard deviation)"
+    return found, [f"Assumed parameters are taken as known to {known}."]
+
+
+def _decided_by_unreached(drive: Drive, values: _Values) -> NDArray[np.bool_]:
+    """Numbers (8, 2) that limits decide which no test reached."""
+    never = drive.parameters.unreached
+    near, far = values.of(_at_limits(drive, never)), values.of(without_limits(drive, never))
+    decided: NDArray[np.bool_] = np.abs(far - near) > OPEN * np.abs(near)
+    return decided
+
+
+def _doubt_lag(found: _Found, stages: Sequence[StageFit], unseen: Mapping[str, float]) -> None:
+    """Leave what an orifice decides without an interval if a lag may stand for it."""
+    for side, column in enumerate(("Z16_plus", "Z16_minus")):
+        if not _mistaken_for_a_lag(column, stages, unseen):
+            continue
+        # the lag is the same both ways, and the delay follows it
+        places = [(ACCELERATION, side), *((row, way) for row in (DELAY, LAG) for way in (0, 1))]
+        for place in places:
+            found.notes[place] = f"{column} fixed"
+            found.lower[place] = found.upper[place] = np.nan
 
 
 def _keep_signs(found: _Found) -> None:

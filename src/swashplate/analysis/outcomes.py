@@ -326,7 +326,10 @@ def outcome_matrix(speed: Array, trial: Trial, outcomes: Sequence[Outcome]) -> A
 
 
 def side_by_side(runs: Mapping[str, Simulation]) -> Table:
-    """Outcomes of drives under the same command, by the drives' names."""
+    """Outcomes of drives under the same command, by the drives' names.
+
+    Without those that `key_numbers` has of every machine, and one that needs a reference.
+    """
     first = next(iter(runs.values()))
     assert first.voltage is not None  # runs by voltage only
     trial = Trial(first.voltage, first.record.rate, first.shaft_speed)
@@ -334,6 +337,6 @@ def side_by_side(runs: Mapping[str, Simulation]) -> Table:
     columns = (Column(name, "z.2f", none="none") for name in runs)
     table = Table("", (Column(""), *columns, UNIT))
     for outcome in OUTCOMES.values():
-        if outcome.name != "tracking_error":  # there is no reference
+        if outcome.name not in ("tracking_error", "largest_acceleration", "creep"):
             outcome.add_to(table, outcome.compute(speeds, trial).tolist())
     return table

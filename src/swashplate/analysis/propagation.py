@@ -175,7 +175,7 @@ def spread_of(stages: Sequence[StageFit], numbers: Numbers, left_out: Sequence[s
     What the tests do not determine, a direction in which parameters move together unseen, or a
     parameter that no test exercises, is moved as far as the bounds of the search.
     """
-    derivatives = _Derivatives(stages, numbers)
+    derivatives = _MovedNumbers(stages, numbers)
     variance = np.zeros_like(derivatives.base)
     for stage in stages:
         for axis in _principal_axes(stage):
@@ -275,7 +275,7 @@ def _errors_at_bounds(stage: StageFit) -> Iterator[tuple[str, Array]]:
             yield name, covariance[index] / deviation
 
 
-class _Derivatives:
+class _MovedNumbers:
     """Derivatives of numbers of a fitted drive by what the fit found or took as known."""
 
     def __init__(self, stages: Sequence[StageFit], numbers: Numbers) -> None:

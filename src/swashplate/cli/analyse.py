@@ -124,7 +124,8 @@ def limits(
         draw_figure(plot, "plot_envelope", capability)
         machine.note(f"{machine.title}: the numbers that matter")
         show_numbers(numbers)
-        note(f"\nUp to {numbers.commands_text}")
+        plus, minus = capability.largest
+        note(f"\nUp to {plus:.3g} and -{minus:.3g} V at the card")
         show(capability.table(rest=True))
         return
     with spinner("Simulating"):

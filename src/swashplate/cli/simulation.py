@@ -24,7 +24,7 @@ from swashplate.cli.options import (
     Simulating,
     TableFile,
 )
-from swashplate.cli.terminal import draw_figure, note, save, say, show, show_numbers, spinner
+from swashplate.cli.terminal import bullets, draw_figure, note, save, say, show, spinner
 from swashplate.documents import parse_toml
 from swashplate.errors import InputError
 from swashplate.tables import Column, Table, quantity, write_table
@@ -162,8 +162,11 @@ def compare(
     draw_figure(plot, "plot_comparison", runs, title=title)
     for label, one in zip(runs, numbers, strict=True):
         note(f"{label}: the numbers that matter")
-        show_numbers(one)
+        show(one.table())
+        bullets(one.what_limits)
         note("")
+    bullets(dict.fromkeys(sentence for one in numbers for sentence in one.basis))
+    note("")
     note(title)
     show(table)
     note(f"rms difference of the speeds: {quantity(rms, 'rad/s', spec='.2f')}")

@@ -209,7 +209,7 @@ class Identification(Estimated):
 
         See `swashplate.analysis.key_numbers`.
         """
-        if isinstance(self.fit.parameters, ModelSetup):
+        if self.fit.stages[0].stage.part == "model":
             return None
         if self.stored is not None and self.stored.numbers == dict(self.fit.parameters.numbers):
             return self.stored.key_numbers
