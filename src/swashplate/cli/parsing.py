@@ -253,9 +253,10 @@ def doubt_of(word: str, drive: Drive) -> str:
     file = drive_file(word)
     if file is None or not file.with_name(FIT_FILE).is_file():
         return drive.parameters.doubt
-    verdict = verdict_of_fit(str(file), drive.parameters.numbers)
-    if verdict is None:
+    stored = fit_of(str(file), drive.parameters.numbers)
+    if stored is None:
         return drive.parameters.doubt
+    verdict = stored.verdict
     if not verdict.usable:
         return verdict.headline
     if verdict.causes:
