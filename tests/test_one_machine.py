@@ -15,7 +15,7 @@ ASKED = {
     "drive": (1, "what is equal to a drive is one"),
     "export": (4, "the door, and a drive's value references, which never change"),
     "full_order": (1, "what is equal to such a drive is one"),
-    "identification": (51, "a fit has its own kinds of model, until it has one problem"),
+    "identification": (53, "a fit has its own kinds of model, until it has one problem"),
     "machine": (3, "the doors: join takes models or machines, linearize refuses what is none"),
     "report": (2, "a page of a fit is that of a drive or of a user-defined model"),
 }

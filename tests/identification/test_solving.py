@@ -1,13 +1,13 @@
 """Unknowns, problems, solvers and starts on a model whose optimum is known."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from tests.identification.given import RISE, TIME, bench_run, put, risen
+from tests.identification.given import RISE, TIME, bench_run, put, risen, run_of
 
 from swashplate import (
     Campaign,
@@ -280,3 +280,60 @@ class Stop:
 def test_a_search_that_lost_the_stop_finds_it_again() -> None:
     (result,) = solve_from(Stop(), [np.full(1, 5.0)])
     np.testing.assert_allclose(result.vector, [1.5])
+
+
+class Thresholded:
+    """A command passes from a threshold on; its gain and a lag act on what passes."""
+
+    def simulate(self, values: Mapping[str, float], experiment: Experiment) -> dict:
+        passed, _ = self._passed(values, experiment)
+        return {"speed": values["gain"] * passed + values["zero"]}
+
+    def linearise(self, values: Mapping[str, float], experiment: Experiment, names) -> dict:
+        passed, slope = self._passed(values, experiment)
+        by = {
+            "threshold": values["gain"] * slope,
+            "gain": passed,
+            "zero": np.ones(passed.size),
+        }
+        speed = values["gain"] * passed + values["zero"]
+        return {"speed": Linearised(speed, np.column_stack([by[name] for name in names]))}
+
+    def _passed(self, values: Mapping[str, float], experiment: Experiment) -> tuple:
+        command = experiment.input.at(experiment["speed"].time)
+        moves = command > values["threshold"]
+        # beyond the threshold it jumps by 1: a level that falls short of it costs a jump
+        return np.where(moves, 1.0 + command - values["threshold"], 0.0), -1.0 * moves
+
+
+def test_a_search_goes_on_past_a_jump_of_the_cost() -> None:
+    levels = np.repeat([0.0, 0.5, 1.0, 2.0, 4.0], 20)
+    time = 0.1 * np.arange(levels.size)
+    true = {"threshold": 0.45, "gain": 3.0, "zero": 0.2}
+    run = run_of("stair", levels, {"speed": np.zeros(levels.size)}, time=time, noise=0.01)
+    measured = Thresholded().simulate(true, run)["speed"]
+    # an offset that only a threshold beyond the level of 0.5 would mend drives the search there
+    measured[levels > 0.5] -= 1.5
+    run = run_of("stair", levels, {"speed": measured}, time=time, noise=0.01)
+    unknowns = Unknowns(
+        (
+            Unknown("threshold", 0.49, 0.01, 3.0),
+            Unknown("gain", 1.0, 0.1, 10.0),
+            Unknown("zero", 0.0, -5.0, 5.0),
+        )
+    )
+    problem = Problem(Thresholded(), (run,), unknowns, ("speed",), {"speed": 0.01})
+    stopped, gone_on = solve(problem), solve(problem, cliffs=2)
+    # what is possible on this side of the jump, by linear least squares
+    least = min(_least_cost(run, threshold) for threshold in np.linspace(0.4, 0.499999, 400))
+    assert gone_on.cost == pytest.approx(least, rel=1e-5)
+    assert stopped.cost > 1.005 * least
+
+
+def _least_cost(run: Experiment, threshold: float) -> float:
+    """Half the least sum of squares with a threshold, over gain and zero."""
+    passed, _ = Thresholded()._passed({"threshold": threshold}, run)
+    columns = np.column_stack([passed, np.ones(passed.size)])
+    measured = run["speed"].values
+    best = np.linalg.lstsq(columns, measured, rcond=None)[0]
+    return 0.5 * float(np.sum((columns @ best - measured) ** 2)) / 0.01**2

@@ -206,7 +206,10 @@ def test_a_command_that_jumps_between_slow_samples_has_instants_one_way_and_none
         for way in ways
     }
     assert len(counts) > 1
-    ((settled,), said) = settle([logged], smooth(HOIST), whole_drive(HOIST))
+    found = settle([logged], smooth(HOIST), whole_drive(HOIST))
+    (settled,) = found.runs
     assert settled.input.interpolation in ways
     assert settled.input.settled
-    assert said
+    assert found.sentences
+    # the fit itself begins there
+    assert found.near["Z10"] == pytest.approx(HOIST.numbers["Z10"], rel=0.3)

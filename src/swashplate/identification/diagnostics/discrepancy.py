@@ -45,8 +45,11 @@ NEAR = 0.25
 COMMANDED = 0.01
 """Part of the largest command from which there is one. [1]"""
 OWN = 0.01
-"""Of 1 less leverage: directions that one maneuver alone determines stay fitted, as one step says
-little of where they would be without it."""
+"""Of 1 less the leverage of a maneuver and of priors: directions that no other one determines stay
+fitted, as one step says little of where they would be without it."""
+OTHERS = 0.5
+"""The same if something is known beforehand: others must determine half of a direction. What they
+leave open of it is stated by what is known, and must not be stated twice."""
 BOUND_LEVEL = 0.9
 """Probability with which the error of a new maneuver lies below the stated one."""
 USUAL_SPREAD, WORTH = 1.3, 20.0
@@ -117,6 +120,7 @@ def _shifts(fit: LinearisedFit, groups: Mapping[str, str]) -> dict[str, _Shift]:
             by = jacobian @ whitening
             parts[groups[run.name]].append(_RunPart(directions, by.T @ by, by.T @ run.residual))
     shifts = dict[str, _Shift]()
+    of_priors = fit.prior @ fit.whitening
     for group, run_parts in parts.items():
         moved = np.unique(np.concatenate([part.directions for part in run_parts]))
         products = np.zeros((moved.size, moved.size))
@@ -127,7 +131,9 @@ def _shifts(fit: LinearisedFit, groups: Mapping[str, str]) -> dict[str, _Shift]:
             along[positions] += part.along
         leverages, axes = np.linalg.eigh(products)
         spare = 1.0 - np.minimum(leverages, 1.0)
-        shared = spare > OWN
+        # what is known beforehand is no other maneuver that would tell
+        known = np.sum((of_priors[:, moved] @ axes) ** 2, axis=0)
+        shared = spare - known > (OTHERS if of_priors.size else OWN)
         gain = np.where(shared, 1.0 / np.where(shared, spare, 1.0), 0.0)
         shifts[group] = _Shift(moved, axes @ (gain * (axes.T @ along)))
     return shifts

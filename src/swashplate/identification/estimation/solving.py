@@ -34,8 +34,6 @@ LEG = 30
 as a step that just reaches the swash plate's stop, it shrinks to nothing."""
 GAINED = 1e-6
 """Relative gain of a leg from which another one is worth it."""
-STUCK = 3
-"""SciPy's ending of a search whose steps became too small."""
 CLIFF, JUMP = 1e-4, 1e-6
 """Change of one of the solver's numbers by which it is tried whether the cost jumps there, and the
 relative jump that counts."""
@@ -276,7 +274,7 @@ def solve(
                 lowest_at_revival = lowest
                 if point is not None:
                     revivals += 1
-            if point is None and ending == STUCK and cliffs > 0:
+            if point is None and ending > 0 and cliffs > 0:
                 cliffs -= 1
                 paused = _at_cliffs(memory, best)
                 point = best if paused.any() else None

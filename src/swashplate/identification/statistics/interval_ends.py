@@ -188,6 +188,13 @@ STRAIGHT = 0.02
 """Half width, in the solver's vector, up to which the drive is linear in all others."""
 SHALLOW = 0.25
 """Part of the linearised rise of the cost below which an interval's end is looked for again."""
+STEEP = 10.0
+"""How many times the linearised rise the cost must rise for a limit's end to be looked for nearer:
+one that is just not reached has no derivative, though it cannot be lower."""
+ALONE = 1e-3
+"""Largest change of the other numbers that goes with a limit which moves nothing. [1]"""
+LEAST_PART = 1e-4
+"""Part of the linearised half width that such an end is at least away."""
 MOST_POINTS = 8
 """Most points of the profile on such a side."""
 LEAST_STEP = 1e-3
@@ -235,6 +242,10 @@ def checked_ends(
     other unknowns moved along as linear theory says. Where it has risen by less than a quarter of
     what it should, the profile is followed on that side, to a true end or to none.
 
+    A limit that a drive just does not reach has no derivative at all, and the linearised interval
+    is that of what was known beforehand, whatever the others are; but it cannot be lower. Where its
+    end costs ten times as much as it should, the place where it costs what it should is taken.
+
     So it is where an end lies beyond a bound at which the cost has risen by more than it should: an
     unknown that next to nothing moves here may well be told farther off.
 
@@ -256,6 +267,7 @@ def checked_ends(
             continue
         direction = inverse[index] / inverse[index, index]
         rise = 0.5 * reach[index] ** 2 / inverse[index, index]
+        alone = index in limits and np.abs(np.delete(direction, index)).max(initial=0.0) < ALONE
         if index in limits and _unneeded(problem, vector, index, cost, rise):
             yield CheckedEnd(index, True, np.inf)
             continue
@@ -267,6 +279,11 @@ def checked_ends(
                 continue  # beyond the model's domain nothing is possible
             room = abs(float(bound - vector[index]))
             shallow = risen < SHALLOW * rise
+            if alone and risen > STEEP * rise:
+                along = sign * reach[index] * direction
+                part = _part_within(problem, vector, along, cost + rise)
+                yield CheckedEnd(index, sign > 0.0, part * float(reach[index]))
+                continue
             if not (shallow or (risen > rise and reach[index] > room > 0.0)):
                 continue
             optimum = Point(float(vector[index]), cost, vector)
@@ -280,6 +297,20 @@ def checked_ends(
                     continue  # as the others make up for this one
                 distance = float(reach[index])
             yield CheckedEnd(index, sign > 0.0, float(distance), better)
+
+
+def _part_within(problem: Problem, vector: Array, change: Array, most: float) -> float:
+    """Part of a change up to which the cost stays within a limit, to a factor of 1.1 or so."""
+    low, high = problem.bounds
+    inside, outside = LEAST_PART, 1.0
+    while outside > 1.1 * inside:
+        middle = float(np.sqrt(inside * outside))
+        try:
+            within = problem.cost(np.clip(vector + middle * change, low, high)) <= most
+        except DomainError:
+            within = False
+        inside, outside = (middle, outside) if within else (inside, middle)
+    return outside
 
 
 def _unneeded(problem: Problem, vector: Array, index: int, cost: float, rise: float) -> bool:

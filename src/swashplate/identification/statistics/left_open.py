@@ -17,7 +17,7 @@ from swashplate.identification.estimation.posterior import Posterior
 from swashplate.identification.estimation.unknowns import Unknowns
 from swashplate.identification.stage_fit import StageFit
 from swashplate.identification.statistics.effects import effect_of_fixed
-from swashplate.identification.statistics.intervals import uncertainty_of
+from swashplate.identification.statistics.intervals import Uncertainty, reach, uncertainty_of
 
 Array = NDArray[np.float64]
 NEGLIGIBLE = 1e-9
@@ -37,7 +37,9 @@ def posterior_of(stages: Sequence[StageFit]) -> Posterior:
     for number, stage in enumerate(stages):
         uncertainty = uncertainty_of(stage)
         shared = stage.problem.unknowns.shared
-        variances, axes = np.linalg.eigh(uncertainty.own.matrix[np.ix_(shared, shared)])
+        nearer = _nearer_ends(uncertainty)
+        matrix = nearer[:, None] * uncertainty.own.matrix * nearer
+        variances, axes = np.linalg.eigh(matrix[np.ix_(shared, shared)])
         for variance, axis in zip(variances, axes.T, strict=True):
             error = np.zeros(len(stage.problem.unknowns))
             error[shared] = np.sqrt(max(float(variance), 0.0)) * axis
@@ -56,6 +58,21 @@ def posterior_of(stages: Sequence[StageFit]) -> Posterior:
         rows |= _of_numbers(stage, errors)
     names = [name for name, row in rows.items() if row.any()]
     return Posterior(tuple(names), _compressed(np.array([rows[name] for name in names])))
+
+
+def _nearer_ends(uncertainty: Uncertainty) -> Array:
+    """(K,) by how much smaller an error is than the linearised one, if an end was found nearer.
+
+    A limit that is just not reached has its nearer end towards what the tests reached; beyond it
+    lies what no motion like theirs shows.
+    """
+    half_widths = reach(uncertainty.own)
+    nearer = np.ones(half_widths.size)
+    for end in uncertainty.ends:
+        width = half_widths[end.number]
+        if width > 0.0:
+            nearer[end.number] = min(nearer[end.number], end.distance / width)
+    return nearer
 
 
 def _own_errors(stages: Sequence[StageFit], sources: Sequence[tuple[int, Array]]) -> list[Array]:
