@@ -133,6 +133,10 @@ def test_the_linear_model_has_the_delay_and_the_lag(hoist: Drive) -> None:
     expected = plain.response(f) * np.exp(-s * DELAY) / (1.0 + s * LAG)
     np.testing.assert_allclose(model.response(f), expected, rtol=1e-9)
     assert model.largest_gain < 0.5 * plain.largest_gain
+    shown = " ".join(model.summary().split())
+    assert "delay of the card 14.000 ms" in shown
+    assert "delay of the solenoids 40.100 ms lag of the solenoids 15.000 ms" in shown
+    assert "solenoids" not in plain.summary()
     assert drive.linearize(current=0.45).delay == DELAY
     assert drive.linearize(4.0, input="solenoid_force").delay == 0.0
     current = drive.linearize(4.0, outputs="current")

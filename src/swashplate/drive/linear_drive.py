@@ -188,6 +188,10 @@ def model_tables(
     if model.input == "voltage":
         delay = 1e3 * model.parameters.numbers["tau"]
         moving.add("delay of the card", delay, unit="ms", spec="z.3f")
+    if model.input in ("voltage", "current") and "late" in model.parameters.options:
+        for name, word in (("solenoid_delay", "delay"), ("solenoid_lag", "lag")):
+            late = 1e3 * model.parameters.numbers.get(name, 0.0)
+            moving.add(f"{word} of the solenoids", late, unit="ms", spec="z.3f")
     moving.add("bandwidth (-3 dB)", _none_if_infinite(model.bandwidth), unit="Hz", spec=".4g")
     moving.add(f"gain {at}", abs(answer), unit=f"rad/s/{unit}", spec=".5g")
     moving.add(f"phase {at}", float(np.angle(answer, deg=True)), unit="deg", spec="z.2f")
