@@ -23,7 +23,7 @@ from swashplate import (
     SwashplateError,
     maneuvers,
 )
-from swashplate.identification import ModelSetup, Search, fit, load_setup
+from swashplate.identification import ModelSetup, Search, fit, load_setup, whole_drive
 from swashplate.identification.estimation.setup import Free, setup_text
 from swashplate.machine import Model
 
@@ -190,9 +190,9 @@ def test_each_form_of_the_arguments_is_the_same(form, result, campaign, tmp_path
 @pytest.mark.slow
 def test_drive_and_configuration_come_from_the_campaign(campaign: Campaign) -> None:
     found = swashplate.identify(campaign.path)
-    assert found.fit.setup == load_setup("hoist")
+    assert found.fit.setup == whole_drive(Drive.preset("hoist").parameters)
     assert found.fit.nominal.name == "hoist"
-    assert swashplate.identify(campaign, free="hoist").fit.setup == found.fit.setup
+    assert swashplate.identify(campaign, free="hoist").fit.setup == load_setup("hoist")
 
 
 PARTS: Mapping[str, tuple[Mapping[str, Any], str]] = {
