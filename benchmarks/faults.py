@@ -143,13 +143,20 @@ def stated_and_true(prediction, drive, run, largest):
     for motion, inside in discrepancy.classes_of(record, prediction.reach, largest).items():
         if inside.sum() < FEWEST or np.ptp(speed[inside]) < STILL * prediction.reach:
             continue
-        stated = 100.0 * prediction.error(signal[inside], rate[inside])
+        stated = 100.0 * stated_error(prediction, motion, signal[inside], rate[inside])
         true = 100.0 * np.sqrt(np.mean((signal - speed)[inside] ** 2)) / prediction.reach
         yield {
             "motion": motion,
             "stated": stated if motion in known else None,
             "true": float(true),
         }
+
+
+def stated_error(prediction, motion, signal, rate):
+    """Error over the range of the model in a maneuver, and what is left open of its class. [1]"""
+    model = np.mean(prediction.squares(signal, rate)) / prediction.reach**2
+    open_by_class = {stated[0]: stated[4] for stated in prediction.classes}
+    return float(np.sqrt(model + open_by_class.get(motion, 0.0) ** 2))
 
 
 def findings(program, folder):

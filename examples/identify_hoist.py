@@ -71,7 +71,7 @@ for stage in setup.stages:
 # that the fitted card makes.
 
 # %%
-result = identify(campaign)
+result = identify(campaign, free=setup)
 for each in result.fit.stages:
     ended = "converged" if each.solution.converged else each.solution.message
     print(f"{each.stage.name}: {ended}")

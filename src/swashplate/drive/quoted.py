@@ -185,7 +185,7 @@ class KeyNumbers(Tabular):
     >>> round(numbers["top_speed_plus"].value, 2)
     3.42
     >>> numbers.limits[0].name
-    'swash stop'
+    'orifice'
     """
 
     name: str

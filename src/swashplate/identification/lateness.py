@@ -27,8 +27,8 @@ LARGEST = 0.5
 """[s]"""
 MATTERS = 0.003
 """Sum of both below which neither is of use to anybody. [s]"""
-EXPLAINS = 0.05
-"""Part of the cost that they must explain, others following: less may be any error of a model."""
+EXPLAINS = 0.002
+"""Part of the cost that they must explain, others following: next to nothing is chance."""
 
 
 def is_in_question(setup: FitSetup, nominal: Parameters) -> bool:

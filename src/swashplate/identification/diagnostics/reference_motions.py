@@ -47,7 +47,7 @@ class ReferenceMotion(NamedTuple):
     """Frequency of a sine that is faster than any test; 0 of any other. [Hz]"""
 
 
-def reference_motions(low: float, high: float, fastest: float) -> Iterator[ReferenceMotion]:
+def motions_between(low: float, high: float, fastest: float) -> Iterator[ReferenceMotion]:
     """The motions between two commands, 0 within them, for tests with sines of up to a frequency.
 
     Without a sine in the tests `fastest` is 0.
@@ -95,7 +95,7 @@ def motions_left_open(
     if low == high == 0.0:
         return
     model = DriveModel(stages[-1].drive.parameters)
-    for motion in reference_motions(low, high, fastest):
+    for motion in motions_between(low, high, fastest):
         experiment = _moved(template, motion.values)
         try:
             response = linearised_model(model, {}, experiment, posterior.names)

@@ -20,6 +20,8 @@ from swashplate.identification.statistics.effects import effect_of_fixed
 from swashplate.identification.statistics.intervals import Uncertainty, reach, uncertainty_of
 
 Array = NDArray[np.float64]
+ALONE = 0.01
+"""Largest correlation of an error that goes with no other. [1]"""
 NEGLIGIBLE = 1e-9
 """Share of the largest singular value below which an error counts as none. [1]"""
 
@@ -64,13 +66,16 @@ def _nearer_ends(uncertainty: Uncertainty) -> Array:
     """(K,) by how much smaller an error is than the linearised one, if an end was found nearer.
 
     A limit that is just not reached has its nearer end towards what the tests reached; beyond it
-    lies what no motion like theirs shows.
+    lies what no motion like theirs shows. Only of one whose error goes with no other: of two that
+    make up for each other, neither can be smaller by itself.
     """
     half_widths = reach(uncertainty.own)
+    correlation = np.abs(uncertainty.own.correlation)
+    np.fill_diagonal(correlation, 0.0)
     nearer = np.ones(half_widths.size)
     for end in uncertainty.ends:
         width = half_widths[end.number]
-        if width > 0.0:
+        if width > 0.0 and correlation[end.number].max(initial=0.0) < ALONE:
             nearer[end.number] = min(nearer[end.number], end.distance / width)
     return nearer
 
