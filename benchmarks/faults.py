@@ -155,7 +155,8 @@ def stated_and_true(prediction, drive, run, largest):
 def stated_error(prediction, motion, signal, rate):
     """Error over the range of the model in a maneuver, and what is left open of its class. [1]"""
     model = np.mean(prediction.squares(signal, rate)) / prediction.reach**2
-    open_by_class = {stated[0]: stated[4] for stated in prediction.classes}
+    classes = (discrepancy.ClassError(*stated) for stated in prediction.classes)
+    open_by_class = {stated.motion: stated.left_open for stated in classes}
     return float(np.sqrt(model + open_by_class.get(motion, 0.0) ** 2))
 
 

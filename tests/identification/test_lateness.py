@@ -42,7 +42,7 @@ def test_a_delay_and_a_lag_behind_the_current_are_found(tmp_path) -> None:
     result = identify(campaign)
     found = sum(result[name].value for name in LATE)
     assert found == pytest.approx(0.06, abs=0.006)
-    assert result.drive.linearize(voltage=4.0).delay > 0.03
+    assert result.drive.linearize(4.0).delay > 0.03
     command = parse("sine:5,0.4,length=8")
     expected = late.simulate(command).shaft_speed
     error = result.drive.simulate(command).shaft_speed - expected
