@@ -60,13 +60,13 @@ def lateness_of(
     """
     late: Stage = with_lateness(FitSetup(stages=(stage_fit.stage,))).stages[0]
     problem = stage_problem(late, nominal, runs, threads=stage_fit.problem.threads)
-    found = stage_fit.problem.unknowns
-    worths = [unknown.worth for unknown in found if unknown.prior is not None]
+    fitted = stage_fit.problem.unknowns
+    worths = [unknown.worth for unknown in fitted if unknown.prior is not None]
     usual = float(np.median(worths)) if worths else 1.0
-    known = {unknown.label: unknown.worth for unknown in found}
-    items = tuple(replace(u, worth=known.get(u.label, usual)) for u in problem.unknowns)
+    worth_of = {unknown.label: unknown.worth for unknown in fitted}
+    items = tuple(replace(u, worth=worth_of.get(u.label, usual)) for u in problem.unknowns)
     problem = replace(problem, unknowns=replace(problem.unknowns, items=items))
-    start = problem.unknowns.vector_of(found.values(stage_fit.solution.vector))
+    start = problem.unknowns.vector_of(fitted.values(stage_fit.solution.vector))
     try:
         residuals, jacobian = problem.evaluate(start)
     except DomainError:

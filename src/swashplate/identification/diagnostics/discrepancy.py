@@ -518,7 +518,7 @@ def prediction_errors(
         coefficients[1] += measured.instrument.gain**2 / 3.0
         constant, by_signal, by_rate = coefficients.tolist()
         of_channel = motions.get(name, ())
-        largest = max((cell_command(part.record) for part in of_channel), default=0.0)
+        largest = max((_largest_command(part.record) for part in of_channel), default=0.0)
         errors.append(
             PredictionError(
                 channel=name,
@@ -543,7 +543,7 @@ class LeftOpen(NamedTuple):
     """Frequency of a sine that is faster than any test; 0 of any other motion. [Hz]"""
 
 
-def cell_command(record: ChannelErrors) -> float:
+def _largest_command(record: ChannelErrors) -> float:
     """Largest command of a record."""
     return float(np.abs(record.command).max())
 

@@ -149,10 +149,10 @@ def _ways(
             solution = solve(problem, start, loss=loss, tolerance=NEAR, max_evaluations=ENOUGH)
         except DomainError:
             return None  # the fit itself says where the model does not hold
-        found = problem.unknowns.values(solution.vector)
-        ways[between] = _Way(solution.cost, found)
+        values = problem.unknowns.values(solution.vector)
+        ways[between] = _Way(solution.cost, values)
         if first.has_spreads:
-            near = found
+            near = values
     return ways
 
 
