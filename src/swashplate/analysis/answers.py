@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
@@ -29,7 +29,7 @@ from swashplate.drive import (
     command_unit,
 )
 from swashplate.errors import InputError, SwashplateError
-from swashplate.identification import Fit, Identification, StageFit, tested_commands
+from swashplate.identification import Fit, Identification, Optimum, tested_commands
 from swashplate.identification.estimation import limits_unreached
 from swashplate.identification.statistics import unseen_limits
 from swashplate.machine.marching import SOURCE_RATE
@@ -117,7 +117,7 @@ def key_numbers(machine: Drive | Fit | Identification) -> KeyNumbers:
             unreached=limits_unreached(machine.runs, machine.drive.parameters),
             tested=tested_commands(machine.runs),
         )
-        return numbers_of_fit(Drive(parameters), machine.stages)
+        return numbers_of_fit(Drive(parameters), machine)
     values = _Values(machine)
     try:
         found = _without_fit(machine, values)
@@ -126,15 +126,15 @@ def key_numbers(machine: Drive | Fit | Identification) -> KeyNumbers:
     return values.shown(found, _limits_of(machine, values))
 
 
-def numbers_of_fit(drive: Drive, stages: Sequence[StageFit]) -> KeyNumbers:
+def numbers_of_fit(drive: Drive, fit: Optimum) -> KeyNumbers:
     """The numbers of a fitted drive with their intervals; see `key_numbers`.
 
     The drive knows what its tests reached, and how its logs hold the command.
     """
     values = _Values(drive)
     try:
-        found, remarks = _with_fit(drive, stages, values)
-        limits = _limits_of(drive, values, unseen_limits(stages))
+        found, remarks = _with_fit(drive, fit, values)
+        limits = _limits_of(drive, values, unseen_limits(fit))
     except SwashplateError as error:
         return values.none(error)
     numbers = values.shown(found, limits)
@@ -310,19 +310,17 @@ def _without_fit(drive: Drive, values: _Values) -> _Found:
     return found
 
 
-def _with_fit(
-    drive: Drive, stages: Sequence[StageFit], values: _Values
-) -> tuple[_Found, list[str]]:
+def _with_fit(drive: Drive, fit: Optimum, values: _Values) -> tuple[_Found, list[str]]:
     """Numbers of a fitted drive with their 95 % intervals, and what these leave out."""
     numbers = values.of(drive)
     shape = numbers.shape
-    unseen = unseen_limits(stages)
+    unseen = unseen_limits(fit)
 
     def flat(varied: Drive) -> Array:
         return values.of(varied).ravel()
 
     try:
-        spread = spread_of(stages, flat, tuple(unseen))
+        spread = spread_of(fit, flat, tuple(unseen))
     except SwashplateError as error:
         found = _open_ends(numbers)
         _notes(values, found)
@@ -346,15 +344,15 @@ def _with_fit(
         found.notes[leaning.reshape(shape)] = f"{name} {AT_BOUND}"
     found.notes[np.isinf(below) | np.isinf(above)] = "not determined"
     if left_open.any():
-        at_ends = spread_of(stages, lambda varied: flat(_at_limits(varied, unseen)), tuple(unseen))
+        at_ends = spread_of(fit, lambda varied: flat(_at_limits(varied, unseen)), tuple(unseen))
         cautious = at_ends.half.reshape(shape) * np.where(far > near, -1.0, 1.0)
         _one_sided(found, near + cautious, far, left_open)
         # what depends only on an estimate without an upper end has a value all the same
         found.notes[left_open] = ""
         found.notes[left_open & _decided_by_unreached(drive, values)] = NOT_SEEN
-    _doubt_lag(found, stages, unseen)
+    _doubt_lag(found, fit, unseen)
     _notes(values, found)
-    if not assumed_parameters(stages):
+    if not assumed_parameters(fit):
         return found, []
     known = f"{100.0 * ERROR_OF_ASSUMED:.0f} % (standard deviation)"
     return found, [f"Assumed parameters are taken as known to {known}."]
@@ -368,10 +366,10 @@ def _decided_by_unreached(drive: Drive, values: _Values) -> NDArray[np.bool_]:
     return decided
 
 
-def _doubt_lag(found: _Found, stages: Sequence[StageFit], unseen: Mapping[str, float]) -> None:
+def _doubt_lag(found: _Found, fit: Optimum, unseen: Mapping[str, float]) -> None:
     """Leave what an orifice decides without an interval if a lag may stand for it."""
     for side, column in enumerate(("Z16_plus", "Z16_minus")):
-        if not _mistaken_for_a_lag(column, stages, unseen):
+        if not _mistaken_for_a_lag(column, fit, unseen):
             continue
         # the lag is the same both ways, and the delay follows it
         places = [(ACCELERATION, side), *((row, way) for row in (DELAY, LAG) for way in (0, 1))]
@@ -397,17 +395,12 @@ def _at_limits(drive: Drive, limits: Mapping[str, float]) -> Drive:
     return Drive(drive.parameters.with_numbers(limits))
 
 
-def _mistaken_for_a_lag(
-    column: str, stages: Sequence[StageFit], unseen: Mapping[str, float]
-) -> bool:
-    """Whether an orifice that no stage estimates may have been mistaken for an estimated lag.
+def _mistaken_for_a_lag(column: str, fit: Optimum, unseen: Mapping[str, float]) -> bool:
+    """Whether an orifice that is not estimated may have been mistaken for an estimated lag.
 
     Of a limited acceleration a fit without the limit makes a longer lag, and says nothing.
     """
-    free = set[str]()
-    for stage in stages:
-        for unknown in stage.problem.unknowns:
-            free.update(unknown.targets)
+    free = {target for unknown in fit.problem.unknowns for target in unknown.targets}
     return column in unseen and column not in free and "Z8" in free
 
 

@@ -15,7 +15,7 @@ from swashplate.analysis.outcomes import Outcome, Trial, outcome_matrix
 from swashplate.analysis.propagation import drive_model_of, effects_on, set_at
 from swashplate.drive import Drive
 from swashplate.errors import DomainError, InputError
-from swashplate.identification import Identification, StageFit, uncertainty_of
+from swashplate.identification import Identification, Optimum, uncertainty_of
 from swashplate.identification.statistics import effect_of_fixed
 from swashplate.parameters import FULL_VOLTAGE, ParameterSet
 from swashplate.results import Result
@@ -69,13 +69,13 @@ class Draws(Result):
         return tuple(sentences)
 
 
-def drawn_drives(stages: Sequence[StageFit], draws: int = 200, seed: int = 0) -> Draws:
+def drawn_drives(fit: Optimum, draws: int = 200, seed: int = 0) -> Draws:
     """Drives that a fit's tests allow, drawn from the errors of its estimates.
 
     Parameters
     ----------
-    stages : sequence of StageFit
-        All stages of the fit.
+    fit : Optimum
+        Of a drive.
     draws : int
         How many, at least 1.
     seed : int
@@ -89,24 +89,20 @@ def drawn_drives(stages: Sequence[StageFit], draws: int = 200, seed: int = 0) ->
     Raises
     ------
     InputError
-        If there is no stage or no draw, or nearly all draws leave the model's domain.
+        If there is no draw, or nearly all draws leave the model's domain.
 
     Notes
     -----
-    Errors are normal in the solver's vector, so that a logarithmic parameter is log-normal. What
-    the card's stage does not know moves pump and motor as the fit would follow it: δ₁ = ε₁ and
-    δ₂ = S δ₁ + ε₂ with independent normal ε, see `identification.intervals`. Fixed parameters with
-    a standard uncertainty are drawn as well, and the estimates follow them.
+    Errors are normal in the solver's vector, so that a logarithmic parameter is log-normal. Fixed
+    parameters with a standard uncertainty are drawn as well, and the estimates follow them.
     """
-    if not stages:
-        raise InputError("A Monte Carlo needs at least one stage of a fit.")
     if draws < 1:
         raise InputError(f"There must be at least one draw, not {draws}.")
     random = np.random.default_rng(seed)
     drives = list[Drive]()
     redrawn = 0
     while len(drives) < draws:
-        parameters = _drawn(stages, random)
+        parameters = _drawn(fit, random)
         if parameters is not None:
             drives.append(Drive(parameters))
             continue
@@ -117,58 +113,37 @@ def drawn_drives(stages: Sequence[StageFit], draws: int = 200, seed: int = 0) ->
                 "and the model's domain: the errors are too large for a Monte Carlo; test more, or "
                 "free fewer parameters."
             )
-    fixed = []
-    for stage in stages:
-        determined = uncertainty_of(stage).own.determined
-        for unknown, is_determined in zip(stage.problem.unknowns, determined, strict=True):
-            if unknown.run is None and not is_determined:
-                fixed.append(unknown.name)
+    determined = uncertainty_of(fit).own.determined
+    fixed = [
+        unknown.name
+        for unknown, is_determined in zip(fit.problem.unknowns, determined, strict=True)
+        if unknown.run is None and not is_determined
+    ]
     return Draws(tuple(drives), redrawn, tuple(fixed))
 
 
-def _drawn(stages: Sequence[StageFit], random: np.random.Generator) -> ParameterSet | None:
-    """A set with drawn errors of each stage's vector; None outside bounds or domain."""
-    names = effects_on(stages)
+def _drawn(fit: Optimum, random: np.random.Generator) -> ParameterSet | None:
+    """A set with drawn errors of the vector; None outside bounds or domain."""
+    names = effects_on(fit)
     effects = dict(zip(names, random.normal(size=len(names)).tolist(), strict=True))
-    errors = {}
-    for stage in stages:
-        covariance = uncertainty_of(stage).own.matrix
-        errors[stage.stage.name] = random.multivariate_normal(
-            np.zeros(len(covariance)), covariance, check_valid="ignore", method="eigh"
-        )
-    return _with_errors(stages, errors, effects)
-
-
-def _with_errors(
-    stages: Sequence[StageFit], own_errors: Mapping[str, Array], effects: Mapping[str, float]
-) -> ParameterSet | None:
-    """A set with errors of each stage's vector; None outside bounds or domain.
-
-    `effects` are systematic effects, fixed numbers among them, in standard uncertainties.
-    """
-    numbers = drive_model_of(stages).parameters.numbers
+    uncertainty = uncertainty_of(fit)
+    covariance = uncertainty.own.matrix
+    vector = fit.solution.vector + random.multivariate_normal(
+        np.zeros(len(covariance)), covariance, check_valid="ignore", method="eigh"
+    )
+    for effect, size in effects.items():
+        if effect in uncertainty.systematic:
+            vector = vector + size * uncertainty.systematic[effect]
+    low, high = fit.problem.unknowns.bounds
+    if ((vector < low) | (vector > high))[uncertainty.own.determined].any():
+        return None
+    numbers = drive_model_of(fit).parameters.numbers
     fixed = {
         name: numbers[name] + size * effects.get(effect_of_fixed(together), 0.0)
-        for together in stages[0].problem.uncertain
+        for together in fit.problem.uncertain
         for name, size in together.items()
     }
-    errors, vectors = dict[str, Array](), dict[str, Array]()  # of each stage, by its name
-    for stage in stages:
-        uncertainty = uncertainty_of(stage)
-        error = own_errors[stage.stage.name]
-        for earlier in uncertainty.earlier_stages:
-            error = error + earlier.slopes @ errors[earlier.stage]
-        errors[stage.stage.name] = error
-        vector = stage.solution.vector + error
-        for effect, size in effects.items():
-            if effect in uncertainty.systematic:
-                vector = vector + size * uncertainty.systematic[effect]
-        low, high = stage.problem.unknowns.bounds
-        beyond = (vector < low) | (vector > high)
-        if beyond[uncertainty.own.determined].any():
-            return None
-        vectors[stage.stage.name] = vector
-    return set_at(stages, vectors, fixed)
+    return set_at(fit, vector, fixed)
 
 
 # --- drives of a stored fit -----------------------------------------------------------------------
@@ -217,7 +192,7 @@ def stored_draws(
                 f"The fit in {path} belongs to another drive ({', '.join(different[:3])} differ): "
                 f"give its fitted drive, {path}."
             )
-    return drawn_drives(fit.stages, draws, seed)
+    return drawn_drives(fit, draws, seed)
 
 
 # --- bands ----------------------------------------------------------------------------------------

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from swashplate.drive import Drive
 from swashplate.errors import DomainError, ParameterError, SwashplateError
-from swashplate.identification import DriveModel, StageFit, identifiability_of, uncertainty_of
+from swashplate.identification import DriveModel, Optimum, identifiability_of, uncertainty_of
 from swashplate.identification.estimation import LIMIT_COLUMNS, Forces
 from swashplate.identification.statistics import effect_of_fixed, slopes_by
 from swashplate.parameters import ParameterSet
@@ -49,73 +49,61 @@ so: 5 % of its width. [1]"""
 # --- the drive at other estimates -----------------------------------------------------------------
 
 
-def drive_model_of(stages: Sequence[StageFit]) -> DriveModel:
-    """The model of the drive that the first stage began with."""
-    model = stages[0].problem.model
+def drive_model_of(fit: Optimum) -> DriveModel:
+    """The model of the drive that was fitted, with what it began with."""
+    model = fit.problem.model
     assert isinstance(model, DriveModel)
     return model
 
 
 def set_at(
-    stages: Sequence[StageFit],
-    vectors: Mapping[str, Array] = MappingProxyType({}),
-    fixed: Mapping[str, float] = NO_NUMBERS,
+    fit: Optimum, vector: Array, fixed: Mapping[str, float] = NO_NUMBERS
 ) -> ParameterSet | None:
-    """The drive of a fit at other vectors and with other fixed numbers; None outside the domain.
+    """The drive of a fit at another vector (K,) and with other fixed numbers, by column. [SI]
 
-    Vectors are by their stage's name, by default where it ended; fixed numbers are by column. [SI]
+    None outside the domain.
     """
-    parameters = drive_model_of(stages).parameters
+    model = drive_model_of(fit)
+    parameters = model.parameters
     try:
         if fixed:
             parameters = parameters.with_numbers(fixed, parameters.options)
-        for stage in stages:
-            problem = stage.problem
-            assert isinstance(problem.model, DriveModel)
-            vector = vectors.get(stage.stage.name, stage.solution.vector)
-            # a new model: the fitted one keeps what it computed for other parameters
-            fresh = DriveModel(parameters, problem.model.part, forces=problem.model.forces)
-            parameters = fresh.parameters_at(problem.unknowns.targets(vector, ""))
+        # a new model: the fitted one keeps what it computed for other parameters
+        fresh = DriveModel(parameters, model.part, forces=model.forces)
+        return fresh.parameters_at(fit.problem.unknowns.targets(vector, ""))
     except (DomainError, ParameterError):
         return None
-    return parameters
 
 
-def effects_on(stages: Sequence[StageFit]) -> list[str]:
-    """Names of the systematic effects that move an estimate of the machine in some stage."""
-    moving = dict[str, None]()
-    for stage in stages:
-        machine = stage.problem.unknowns.shared
-        for effect, change in uncertainty_of(stage).systematic.items():
-            if np.abs(change[machine]).max(initial=0.0) > NEGLIGIBLE:
-                moving[effect] = None
+def effects_on(fit: Optimum) -> list[str]:
+    """Names of the systematic effects that move an estimate of the machine."""
+    machine = fit.problem.unknowns.shared
+    moving = {
+        effect: None
+        for effect, change in uncertainty_of(fit).systematic.items()
+        if np.abs(change[machine]).max(initial=0.0) > NEGLIGIBLE
+    }
     # a fixed number that moves no estimate still moves what is computed of the drive
-    for together in stages[0].problem.uncertain:
+    for together in fit.problem.uncertain:
         moving[effect_of_fixed(together)] = None
     return list(moving)
 
 
-def assumed_parameters(stages: Sequence[StageFit]) -> list[dict[str, float]]:
+def assumed_parameters(fit: Optimum) -> list[dict[str, float]]:
     """Standard deviations of the fixed parameters that nobody measured, by column.
 
     A mapping for each parameter of the fit's initial set whose status is "assumed" or
-    "approximate"; it holds both directions. Left out are parameters that a stage estimates and
-    those whose uncertainty is stated.
+    "approximate"; it holds both directions. Left out are parameters that are estimated and those
+    whose uncertainty is stated.
     """
-    model = stages[0].problem.model
-    assert isinstance(model, DriveModel)
-    estimated = set[str]()
-    for stage in stages:
-        for unknown in stage.problem.unknowns:
-            estimated.update(unknown.targets)
-    if any(stage.stage.forces is not None for stage in stages):
-        estimated.update(Forces.columns)
-    with_stated_uncertainty = set[str]()
-    for columns in stages[0].problem.uncertain:
-        with_stated_uncertainty.update(columns)
-    left_out = estimated | with_stated_uncertainty | LIMIT_COLUMNS.keys()
+    left_out = {target for unknown in fit.problem.unknowns for target in unknown.targets}
+    left_out |= LIMIT_COLUMNS.keys()
+    if fit.setup.forces is not None:
+        left_out.update(Forces.columns)
+    for with_stated_uncertainty in fit.problem.uncertain:
+        left_out.update(with_stated_uncertainty)
     assumed = []
-    for parameter in model.parameters.values():
+    for parameter in drive_model_of(fit).parameters.values():
         numbers = {
             column: ERROR_OF_ASSUMED * value
             for column, value in parameter.numbers.items()
@@ -145,13 +133,13 @@ class Spread(Result):
     """By the estimates that ended at a bound of their search: which numbers lean on them."""
 
 
-def spread_of(stages: Sequence[StageFit], numbers: Numbers, left_out: Sequence[str] = ()) -> Spread:
+def spread_of(fit: Optimum, numbers: Numbers, left_out: Sequence[str] = ()) -> Spread:
     """95 % intervals of numbers of a fitted drive, from the errors of its estimates.
 
     Parameters
     ----------
-    stages : sequence of StageFit
-        All stages of the fit.
+    fit : Optimum
+        Of a drive.
     numbers : callable
         From a drive to (N,) numbers.
     left_out : sequence of str
@@ -160,14 +148,13 @@ def spread_of(stages: Sequence[StageFit], numbers: Numbers, left_out: Sequence[s
     Raises
     ------
     InputError
-        If a stage has no more samples than unknowns.
+        If there are no more samples than unknowns.
 
     Notes
     -----
     To first order: the sum of squares of what the numbers change by for one standard error along
-    each principal axis of every stage's covariance, one standard uncertainty of each systematic
-    effect, and one of each assumed number. The later stages follow an error of the earlier ones as
-    the fit would, the estimates follow an assumed number so that the drive still agrees with the
+    each principal axis of the covariance, one standard uncertainty of each systematic effect, and
+    one of each assumed number, which the estimates follow so that the drive still agrees with the
     tests. A derivative is that of a small step, to the side that bounds and model allow. An
     estimate at a bound counts as one that is free to move, as in its neighbours' intervals: if
     neither side is allowed, as several are at bounds, the derivative is taken unknown by unknown.
@@ -175,45 +162,35 @@ def spread_of(stages: Sequence[StageFit], numbers: Numbers, left_out: Sequence[s
     What the tests do not determine, a direction in which parameters move together unseen, or a
     parameter that no test exercises, is moved as far as the bounds of the search.
     """
-    derivatives = _MovedNumbers(stages, numbers)
+    derivatives = _MovedNumbers(fit, numbers)
     variance = np.zeros_like(derivatives.base)
-    for stage in stages:
-        for axis in _principal_axes(stage):
-            variance += derivatives.along(_followed(stages, {stage.stage.name: axis})) ** 2
-    for effect in effects_on(stages):
-        changes = {
-            stage.stage.name: _within_bounds(stage) @ systematic[effect]
-            for stage in stages
-            if effect in (systematic := uncertainty_of(stage).systematic)
-        }
+    for axis in _principal_axes(fit):
+        variance += derivatives.along(axis) ** 2
+    within, systematic = _within_bounds(fit), uncertainty_of(fit).systematic
+    nothing = np.zeros(len(fit.problem.unknowns))
+    for effect in effects_on(fit):
         fixed = dict[str, float]()
-        for together in stages[0].problem.uncertain:
+        for together in fit.problem.uncertain:
             if effect_of_fixed(together) == effect:
                 fixed.update(together)
-        variance += derivatives.along(changes, fixed) ** 2
-    assumed = assumed_parameters(stages)
-    following = {
-        stage.stage.name: _within_bounds(stage) @ slopes_by(stage, assumed)
-        for stage in stages
-        if assumed
+        variance += derivatives.along(within @ systematic.get(effect, nothing), fixed) ** 2
+    assumed = assumed_parameters(fit)
+    following = within @ slopes_by(fit, assumed)
+    for together, change in zip(assumed, following.T, strict=True):
+        variance += derivatives.along(change, together) ** 2
+    at_bounds = {
+        name: derivatives.along(error) ** 2 > LEANS * variance
+        for name, error in _errors_at_bounds(fit)
     }
-    for k, together in enumerate(assumed):
-        changes = {name: slopes[:, k] for name, slopes in following.items()}
-        variance += derivatives.along(_followed(stages, changes), together) ** 2
-    at_bounds = dict[str, NDArray[np.bool_]]()
-    for stage in stages:
-        for name, error in _errors_at_bounds(stage):
-            part = derivatives.along(_followed(stages, {stage.stage.name: error})) ** 2
-            at_bounds[name] = part > LEANS * variance
     below, above = derivatives.left_open(left_out)
     return Spread(QUANTILE * np.sqrt(variance), below, above, at_bounds)
 
 
-def _principal_axes(stage: StageFit) -> Iterator[Array]:
-    """Standard errors (K,) along the axes of a stage's covariance of the machine's unknowns."""
-    unknowns = stage.problem.unknowns
+def _principal_axes(fit: Optimum) -> Iterator[Array]:
+    """Standard errors (K,) along the axes of the covariance of the machine's unknowns."""
+    unknowns = fit.problem.unknowns
     machine = unknowns.shared
-    covariance = _covariance(stage)[np.ix_(machine, machine)]
+    covariance = _covariance(fit)[np.ix_(machine, machine)]
     variances, axes = np.linalg.eigh(covariance)
     for variance, axis in zip(variances, axes.T, strict=True):
         error = np.zeros(len(unknowns))
@@ -221,21 +198,8 @@ def _principal_axes(stage: StageFit) -> Iterator[Array]:
         yield error
 
 
-def _followed(stages: Sequence[StageFit], own: Mapping[str, Array]) -> dict[str, Array]:
-    """Changes of all stages' vectors for changes of some, which the later stages follow."""
-    changes = dict[str, Array]()
-    for stage in stages:
-        change = own.get(stage.stage.name, np.zeros(len(stage.problem.unknowns)))
-        for earlier in uncertainty_of(stage).earlier_stages:
-            followed = earlier.slopes @ changes[earlier.stage]
-            if followed.any():
-                change = change + _within_bounds(stage) @ followed
-        changes[stage.stage.name] = change
-    return changes
-
-
-def _within_bounds(stage: StageFit) -> Array:
-    """Factor (K, K) by which errors of a stage's vector shrink if its bounds were known beforehand.
+def _within_bounds(fit: Optimum) -> Array:
+    """Factor (K, K) by which errors of the vector shrink if its bounds were known beforehand.
 
     Notes
     -----
@@ -243,32 +207,32 @@ def _within_bounds(stage: StageFit) -> Array:
     the bounds: what a posterior's mean and covariance make of an error of the data, and of C. What
     tests determine stays as it is; what they hardly do lies within the bounds.
     """
-    low, high = stage.problem.unknowns.bounds
+    low, high = fit.problem.unknowns.bounds
     width = np.clip(high - low, NEGLIGIBLE, UNBOUNDED)
     prior = np.diag(width**2 / 12.0)
-    return np.asarray(prior @ np.linalg.inv(prior + _of_tests(stage)))
+    return np.asarray(prior @ np.linalg.inv(prior + _of_tests(fit)))
 
 
-def _of_tests(stage: StageFit) -> Array:
-    """Covariance (K, K) of a stage's vector as its tests tell it, 0 of what they do not."""
-    covariance = uncertainty_of(stage).own.matrix
+def _of_tests(fit: Optimum) -> Array:
+    """Covariance (K, K) of the vector as the tests tell it, 0 of what they do not."""
+    covariance = uncertainty_of(fit).own.matrix
     return np.where(np.isfinite(covariance), covariance, 0.0)
 
 
-def _covariance(stage: StageFit) -> Array:
-    """Covariance (K, K) of a stage's vector within its bounds."""
-    covariance = _within_bounds(stage) @ _of_tests(stage)
+def _covariance(fit: Optimum) -> Array:
+    """Covariance (K, K) of the vector within its bounds."""
+    covariance = _within_bounds(fit) @ _of_tests(fit)
     return 0.5 * (covariance + covariance.T)
 
 
-def _errors_at_bounds(stage: StageFit) -> Iterator[tuple[str, Array]]:
+def _errors_at_bounds(fit: Optimum) -> Iterator[tuple[str, Array]]:
     """Name of each estimate of the machine at a bound, and a standard error that others follow.
 
     An estimate at its bound is not where the data would have it: by how much it is off is not
     known.
     """
-    unknowns, covariance = stage.problem.unknowns, _covariance(stage)
-    for name in identifiability_of(stage).at_bounds:
+    unknowns, covariance = fit.problem.unknowns, _covariance(fit)
+    for name in identifiability_of(fit).at_bounds:
         index = unknowns.names.index(name)
         deviation = float(np.sqrt(max(covariance[index, index], 0.0)))
         if unknowns[index].run is None and deviation > NEGLIGIBLE:
@@ -278,28 +242,22 @@ def _errors_at_bounds(stage: StageFit) -> Iterator[tuple[str, Array]]:
 class _MovedNumbers:
     """Derivatives of numbers of a fitted drive by what the fit found or took as known."""
 
-    def __init__(self, stages: Sequence[StageFit], numbers: Numbers) -> None:
-        self.stages = stages
+    def __init__(self, fit: Optimum, numbers: Numbers) -> None:
+        self._fit = fit
         self._numbers = numbers
-        self._of_unknowns = dict[tuple[str, int], Array]()
-        self.base = numbers(stages[-1].drive)
+        self._of_unknowns = dict[int, Array]()
+        self.base = numbers(fit.drive)
 
-    def _at(
-        self, changes: Mapping[str, Array], fixed: Mapping[str, float] = NO_NUMBERS
-    ) -> Array | None:
-        """The numbers at changed vectors; None outside the bounds or the model's domain."""
-        vectors = dict[str, Array]()
-        for stage in self.stages:
-            if stage.stage.name in changes:
-                change, unknowns = changes[stage.stage.name], stage.problem.unknowns
-                vector = stage.solution.vector + change
-                # at its bound the value of an unknown ends
-                low, high = unknowns.bounds
-                beyond = (vector < low - ROUNDING) | (vector > high + ROUNDING)
-                if (beyond & (change != 0.0))[unknowns.shared].any():
-                    return None
-                vectors[stage.stage.name] = vector
-        parameters = set_at(self.stages, vectors, fixed)
+    def _at(self, change: Array, fixed: Mapping[str, float] = NO_NUMBERS) -> Array | None:
+        """The numbers at a changed vector; None outside the bounds or the model's domain."""
+        unknowns = self._fit.problem.unknowns
+        vector = self._fit.solution.vector + change
+        # at its bound the value of an unknown ends
+        low, high = unknowns.bounds
+        beyond = (vector < low - ROUNDING) | (vector > high + ROUNDING)
+        if (beyond & (change != 0.0))[unknowns.shared].any():
+            return None
+        parameters = set_at(self._fit, vector, fixed)
         if parameters is None:
             return None
         try:
@@ -307,34 +265,28 @@ class _MovedNumbers:
         except SwashplateError:
             return None
 
-    def along(self, changes: Mapping[str, Array], fixed: Mapping[str, float] = NO_NUMBERS) -> Array:
-        """Derivative (N,) along changes of the stages' vectors and of fixed numbers, by column."""
-        largest = max(
-            (float(np.abs(each).max(initial=0.0)) for each in changes.values()), default=0.0
-        )
+    def along(self, change: Array, fixed: Mapping[str, float] = NO_NUMBERS) -> Array:
+        """Derivative (N,) along a change (K,) of the vector and of fixed numbers, by column."""
+        largest = float(np.abs(change).max(initial=0.0))
         if largest <= NEGLIGIBLE and not fixed:
             return np.zeros_like(self.base)
-        slope = self._slope(changes, fixed, min(STEP, LARGEST_STEP / max(largest, NEGLIGIBLE)))
+        slope = self._slope(change, fixed, min(STEP, LARGEST_STEP / max(largest, NEGLIGIBLE)))
         if slope is not None:
             return slope
         total = np.zeros_like(self.base)
         if fixed:
-            alone = self._slope({}, fixed, STEP)
+            alone = self._slope(np.zeros_like(change), fixed, STEP)
             total += 0.0 if alone is None else alone
-        for stage in self.stages:
-            change = changes.get(stage.stage.name, np.zeros(0))
-            for index in np.flatnonzero(np.abs(change) > NEGLIGIBLE).tolist():
-                total += change[index] * self._by_unknown(stage, index)
+        for index in np.flatnonzero(np.abs(change) > NEGLIGIBLE).tolist():
+            total += change[index] * self._by_unknown(index)
         return total
 
-    def _slope(
-        self, changes: Mapping[str, Array], fixed: Mapping[str, float], first: float
-    ) -> Array | None:
+    def _slope(self, change: Array, fixed: Mapping[str, float], first: float) -> Array | None:
         """Derivative by a small step to the first side that is allowed; None if neither is."""
-        numbers = drive_model_of(self.stages).parameters.numbers
+        numbers = drive_model_of(self._fit).parameters.numbers
         for step in (first, -first, 0.1 * first, -0.1 * first):
             moved = self._at(
-                {name: step * change for name, change in changes.items()},
+                step * change,
                 {column: numbers[column] + step * unit for column, unit in fixed.items()},
             )
             if moved is not None:
@@ -342,39 +294,37 @@ class _MovedNumbers:
                 return np.nan_to_num((moved - self.base) / step)
         return None
 
-    def _by_unknown(self, stage: StageFit, index: int) -> Array:
-        """Derivative by one unknown of a stage; 0 if the model does not let it move at all."""
-        key = stage.stage.name, index
-        if key not in self._of_unknowns:
-            unit = np.zeros(len(stage.problem.unknowns))
+    def _by_unknown(self, index: int) -> Array:
+        """Derivative by one unknown; 0 if the model does not let it move at all."""
+        if index not in self._of_unknowns:
+            unit = np.zeros(len(self._fit.problem.unknowns))
             unit[index] = 1.0
-            slope = self._slope({stage.stage.name: unit}, {}, LARGEST_STEP)
-            self._of_unknowns[key] = np.zeros_like(self.base) if slope is None else slope
-        return self._of_unknowns[key]
+            slope = self._slope(unit, {}, LARGEST_STEP)
+            self._of_unknowns[index] = np.zeros_like(self.base) if slope is None else slope
+        return self._of_unknowns[index]
 
     def left_open(self, left_out: Sequence[str]) -> tuple[Array, Array]:
         """By how much numbers fall and grow as far as the bounds along what is not determined."""
         below, above = np.zeros_like(self.base), np.zeros_like(self.base)
-        for stage in self.stages:
-            for direction in _undetermined(stage, left_out):
-                change = LARGEST_STEP * np.abs(self.along({stage.stage.name: direction}))
-                moves = change > FOLLOWS * np.abs(self.base)
-                if not moves.any():
+        for direction in _undetermined(self._fit, left_out):
+            change = LARGEST_STEP * np.abs(self.along(direction))
+            moves = change > FOLLOWS * np.abs(self.base)
+            if not moves.any():
+                continue
+            for sign in (1.0, -1.0):
+                end = self._at_bound(sign * direction)
+                if end is None:
+                    below[moves], above[moves] = inf, inf
                     continue
-                for sign in (1.0, -1.0):
-                    end = self._at_bound(stage, sign * direction)
-                    if end is None:
-                        below[moves], above[moves] = inf, inf
-                        continue
-                    gone = np.where(np.isfinite(end), end - self.base, 0.0)
-                    below[moves] = np.maximum(below, -gone)[moves]
-                    above[moves] = np.maximum(above, gone)[moves]
+                gone = np.where(np.isfinite(end), end - self.base, 0.0)
+                below[moves] = np.maximum(below, -gone)[moves]
+                above[moves] = np.maximum(above, gone)[moves]
         return below, above
 
-    def _at_bound(self, stage: StageFit, direction: Array) -> Array | None:
-        """The numbers as far along a direction as the bounds and the model allow."""
-        vector = stage.solution.vector
-        low, high = stage.problem.unknowns.bounds
+    def _at_bound(self, direction: Array) -> Array | None:
+        """The numbers as far along a direction (K,) as the bounds and the model allow."""
+        vector = self._fit.solution.vector
+        low, high = self._fit.problem.unknowns.bounds
         ends = np.where(direction > 0.0, high - vector, low - vector)
         with np.errstate(divide="ignore", invalid="ignore"):
             reach = np.where(direction != 0.0, ends / direction, inf)
@@ -382,16 +332,16 @@ class _MovedNumbers:
         if not isfinite(farthest):
             return None
         for share in (1.0, 0.5, 0.25, 0.1):
-            moved = self._at({stage.stage.name: share * farthest * direction})
+            moved = self._at(share * farthest * direction)
             if moved is not None:
                 return moved
         return None
 
 
-def _undetermined(stage: StageFit, left_out: Sequence[str]) -> Iterator[Array]:
-    """Directions (K,) of a stage's vector that its tests do not determine."""
-    identifiability = identifiability_of(stage)
-    names = stage.problem.unknowns.names
+def _undetermined(fit: Optimum, left_out: Sequence[str]) -> Iterator[Array]:
+    """Directions (K,) of the vector that the tests do not determine."""
+    identifiability = identifiability_of(fit)
+    names = fit.problem.unknowns.names
     directions: list[Mapping[str, float]] = [each.changes for each in identifiability.null]
     directions += [{name: 1.0} for name in identifiability.unexcited if name not in left_out]
     for changes in directions:

@@ -48,7 +48,6 @@ from swashplate.tables import (
     check_folder,
     count,
     ended,
-    joined,
     made_folder,
     write_text,
 )
@@ -570,11 +569,11 @@ def advise(
     from swashplate.campaign import KINDS
     from swashplate.drive import Drive
     from swashplate.identification import (
-        RunInformation,
         advise,
         load_setup,
         prior_information,
         run_information,
+        whole_drive,
     )
     from swashplate.identification.diagnostics import check_runs, refuse_unsound
     from swashplate.identification.estimation import smooth
@@ -611,7 +610,7 @@ def advise(
         )
     if setup is None:
         setup = _setup_beside(drive if tested else subject)
-    run_informations = list[RunInformation]()
+    information = None
     doubts = tuple[str, ...]()
     run_names = list[str]()
     commanded = list[tuple[float, float]]()
@@ -621,9 +620,7 @@ def advise(
             experiments = basis.experiments
             start = smooth(basis.start)
             doubts = refuse_unsound(check_runs(experiments, start))
-            run_informations = [
-                run_information(stage, start, experiments) for stage in basis.setup.stages
-            ]
+            information = run_information(basis.setup, start, experiments)
             run_names = [experiment.name for experiment in experiments]
             prior = prior_information(start, basis.setup, experiments, fitted=drive is not None)
             commanded = ranges_of_input(experiments)
@@ -633,7 +630,8 @@ def advise(
             commands = None if of_fit is None else of_fit.verdict.commands
             if commands is not None and commands.kind == "voltage":
                 commanded = [(commands.low, commands.high)]
-            prior = prior_information(smooth(untested), load_setup(setup or untested.name))
+            basis_setup = whole_drive(untested) if setup is None else load_setup(setup)
+            prior = prior_information(smooth(untested), basis_setup)
         machine = Drive(prior.parameters)
         most = largest_of_machine(commanded) if largest is None else (largest, largest)
         requested = [trials.named_maneuver(word, machine) for word in maneuver or ()]
@@ -643,15 +641,15 @@ def advise(
         plan_of_tests = sequential_plan(prior.present, candidates, prior.variables, tests)
     sensors = {str(sensor.kind): sensor for sensor in prior.sensors}
     units = {name: KINDS[sensor.kind].units[0] for name, sensor in sensors.items()}
-    shown = ShownAdvice(run_informations, run_names, doubts, ranked, plan_of_tests, sensors, units)
+    shown = ShownAdvice(information, run_names, doubts, ranked, plan_of_tests, sensors, units)
     _show_advice(shown, top, runs=runs, out=out)
 
 
 class ShownAdvice(NamedTuple):
     """What the tests determine, and which come next."""
 
-    run_informations: Sequence[RunInformation]
-    """One a stage; none before any test."""
+    information: RunInformation | None
+    """None before any test."""
     run_names: Sequence[str]
     doubts: Sequence[str]
     ranked: Sequence[Advice]
@@ -694,7 +692,7 @@ def _advice_on_model(
             prior.candidate(test) for test in {each.name: each for each in tests}.values()
         ]
         return ShownAdvice(
-            run_informations=[information],
+            information=information,
             run_names=[experiment.name for experiment in experiments],
             doubts=doubts,
             ranked=advise(prior.present, candidates, prior.variables),
@@ -708,13 +706,14 @@ def _show_advice(shown: ShownAdvice, top: int, *, runs: Path | None, out: Path |
     """Print what the tests determine, then the tests to come."""
     from swashplate.identification.statistics import advice_table, best_tests_table
 
-    determined = [information.table(shown.run_names) for information in shown.run_informations]
-    if determined:
-        save(runs, "Shares of the information", joined(determined).write)
+    if shown.information is not None:
+        shares = shown.information.table(shown.run_names)
+        save(runs, "Shares of the information", shares.write)
     save(out, "Tests", advice_table("", shown.ranked).write)
     for sentence in shown.doubts:
         say(f"! {sentence}")
-    _show_determined(shown.run_informations, determined, shown.run_names)
+    if shown.information is not None:
+        _show_determined(shown.information, shown.run_names)
     show(advice_table("Tests", shown.ranked[:top]))
     if shown.plan:
         show(advice_table("Plan, each test in addition to those before it", shown.plan))
@@ -742,21 +741,14 @@ def _setup_beside(drive: str | None) -> str | None:
     return str(estimated) if estimated.is_file() else None
 
 
-def _show_determined(
-    stage_information: Sequence[RunInformation], tables: Sequence[Table], run_names: Sequence[str]
-) -> None:
-    """Print what the runs determine of the parameters, stage by stage."""
-    for information, table in zip(stage_information, tables, strict=True):
-        show(table)
-        # what no run exercises is said with its reason
-        bullets(
-            replace(information.identifiability, unexcited=()).sentences(), information.sentences()
-        )
-    if not stage_information:
-        return
+def _show_determined(information: RunInformation, run_names: Sequence[str]) -> None:
+    """Print what the runs determine of the parameters."""
+    show(information.table(run_names))
+    # what no run exercises is said with its reason
+    bullets(replace(information.identifiability, unexcited=()).sentences(), information.sentences())
     note("")
     for number, name in enumerate(run_names, start=1):
         note(f"run {number}: {name}")
     say(INFORMATION)
-    if all(information.identifiability.complete for information in stage_information):
+    if information.identifiability.complete:
         note("The fit setup needs no change.")

@@ -101,7 +101,7 @@ class StageClock:
         swashplate rig hoist --out virtual --perturb 0.1
         swashplate fit virtual/campaign.toml --out fitted
         swashplate fit harbour/campaign.toml --setup mine.toml --starts 50 --seed 1
-        swashplate fit harbour/campaign.toml --folds 5 --profile Z16_plus
+        swashplate fit harbour/campaign.toml --profile Z16_plus
         swashplate fit valve/campaign.toml --model valve.py
         swashplate simulate fitted/drive.toml step:9
     """,
@@ -115,14 +115,6 @@ def fit(
     axis: AxisOption = None,
     setup: SetupOption = None,
     model: ModelFile = None,
-    joint: Annotated[
-        bool,
-        typer.Option(
-            "--joint",
-            metavar=NO_VALUE,
-            help="Finally, estimate all parameters together, through the complete drive.",
-        ),
-    ] = False,
     begin: InitialDrive = None,
     starts: Annotated[
         int | None,
@@ -139,9 +131,6 @@ def fit(
         int,
         typer.Option(metavar="N", min=1, help="Largest number of model evaluations per search."),
     ] = MOST_EVALUATIONS,
-    folds: Annotated[
-        int, typer.Option(metavar="N", min=0, help="Number of cross-validation folds (0: off).")
-    ] = 0,
     profile: Annotated[
         list[str] | None,
         typer.Option(
@@ -182,8 +171,8 @@ def fit(
 ) -> None:
     """Identify a drive, or a user-defined model, from its tests.
 
-    Fits the runs with the role 'fit', stage by stage, predicts those with the
-    role 'validate', and shows which parameters the data determine. Writes the
+    Fits the runs with the role 'fit', predicts those with the role
+    'validate', and shows which parameters the data determine. Writes the
     fitted drive as a parameter file, the fit setup, the estimates with
     their intervals, and the data that 'report' needs. Exit code 1: the result is
     not usable. Ctrl-C (exit code 130) and SIGTERM (143) end it within 5 s
@@ -197,10 +186,10 @@ def fit(
         check_free(*(out / name for name in FILES), force=force)
         if report:
             check_free(out / PAGE, force=force)
-    if model is not None and (setup is not None or begin is not None or joint):
+    if model is not None and (setup is not None or begin is not None):
         raise InputError(
-            f"{model} defines its free parameters and their initial values: leave out --setup, "
-            "--from and --joint."
+            f"{model} defines its free parameters and their initial values: leave out --setup "
+            "and --from."
         )
     with spinner("Starting"), clock.part("start and kernels"):
         from swashplate.executors import Dask, Processes
@@ -217,9 +206,7 @@ def fit(
                 start,
                 setup,
                 axis=axis_name,
-                joint=joint,
                 starts=starts,
-                folds=folds,
                 profiles=profile or (),
                 seed=seed,
                 loss=loss,
@@ -230,7 +217,7 @@ def fit(
                 resume=resume,
             )
         except Stopped:
-            if ended := len([*(out / "starts").glob("*/start-*.json")]):
+            if ended := len([*(out / "starts").glob("start-*.json")]):
                 note(
                     f"Interrupted: {count(ended, 'finished start is', 'finished starts are')} kept "
                     f"in {out / 'starts'}; the same command with --resume continues."
@@ -252,7 +239,7 @@ def fit(
 
 
 def _say_fit(result: Identification) -> None:
-    """Print the estimates, stage by stage, and how well each run is followed."""
+    """Print the estimates, and how well each run is followed."""
     from swashplate.identification import parts_of
 
     text_above = False
@@ -362,7 +349,7 @@ def validate(
         if not predicted:
             raise InputError(f"{path}: all samples of these runs are ignored; nothing is left.")
         stated = None if of_fit is None else of_fit.verdict
-        verdict = assess_fit((), predicted, required=require / 100.0, of_fit=stated)
+        verdict = assess_fit(None, predicted, required=require / 100.0, of_fit=stated)
         measures = runs_tables(with_speeds(predicted))
         numbers = None
         if isinstance(parameters, ParameterSet):
@@ -472,7 +459,7 @@ def report(
         verdict = result.verdict
     note(_reported(result, folder, true))
     save(pdf, "Printed", lambda to: print_report(folder / PAGE, to))
-    runs = shown_runs(result.fit.stages, result.predicted)
+    runs = shown_runs(result.fit, result.predicted)
     save(data, "Samples, in SI", lambda to: write_samples(runs, to))
     say_saved()
     say(verdict.headline)
@@ -508,9 +495,9 @@ def demo(
         drawn_drive,
         estimates_table,
         identify,
-        load_setup,
         runs_tables,
         truth_count,
+        whole_drive,
         with_speeds,
     )
     from swashplate.report.figures import plot_channel, save_figure
@@ -518,14 +505,14 @@ def demo(
     if not (out / "virtual" / "truth").is_dir():  # only an earlier demo is replaced
         check_free(out, force=force)
     lock(out)
-    setup = load_setup("hoist")
     with long_work("", 5) as begin:
         begin("testing the virtual hoist")
-        truth = drawn_drive(Drive.preset("hoist").at_every_rate(), setup, seed)
+        nominal = Drive.preset("hoist").at_every_rate()
+        truth = drawn_drive(nominal, whole_drive(nominal.parameters), seed)
         path = rig.write(rig.run("hoist", truth=truth, seed=seed), out / "virtual", overwrite=True)
         begin("reading its logs")
         campaign = Campaign.from_toml(path)
-        begin("fitting the card, then pump and motor")
+        begin("fitting amplifier, pump and motor")
         result = identify(campaign, seed=seed)
         begin("computing intervals and verdict")
         verdict = result.verdict
@@ -539,8 +526,8 @@ def demo(
         figure = plot_channel(run.experiment[run.channel], run.simulated, title=title)
         save_figure(figure, out / "result.png")
     note(f"Campaign:  {path}")
-    estimates = [estimates_table(e, truth=truth.parameters) for e in result.fit.stages]
-    show(*estimates)
+    estimates = estimates_table(result.fit, truth=truth.parameters)
+    show(estimates)
     inside, total = truth_count(estimates)
     say(f"The truth lies within the 95 % interval for {inside} of {total} parameters.")
     note("\nHeld out of the fit, and predicted")

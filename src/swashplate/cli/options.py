@@ -158,11 +158,8 @@ ModelFile = Annotated[
 SetupOption = Annotated[
     str | None,
     typer.Option(
-        metavar="NAME|FILE",
-        help=(
-            "Parameters to estimate: a packaged fit setup (hoist, slew, luff, neutral ...) or "
-            "a TOML file (default: that of the axis's drive)."
-        ),
+        metavar="SETUP.toml",
+        help="Parameters to estimate (default: every number of the drive, known to 30 %).",
     ),
 ]
 InitialDrive = Annotated[

@@ -41,7 +41,13 @@ KIND_NAMES = {
     "setup": "a fit setup",
     "model": "a model file",
 }
-_MARKS = {"runs": "campaign", "stages": "setup", "control_card": "drive", "pump_motor": "drive"}
+_MARKS = {
+    "runs": "campaign",
+    "free": "setup",
+    "stages": "setup",
+    "control_card": "drive",
+    "pump_motor": "drive",
+}
 _INSTEAD = {
     ("log", "campaign"): "make a campaign of it with 'swashplate campaign init {}'",
     ("log", "drive"): "a drive is a packaged name, a parameter file or the folder of a fit",

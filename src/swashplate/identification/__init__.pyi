@@ -12,6 +12,9 @@ from .diagnostics.verdict import Verdict as Verdict
 from .diagnostics.verdict import assess_fit as assess_fit
 from .estimation.drive_model import DriveModel as DriveModel
 from .estimation.drive_model import true_value as true_value
+from .estimation.fit_problem import as_fit_setup as as_fit_setup
+from .estimation.fit_problem import smooth as smooth
+from .estimation.fit_problem import whole_drive as whole_drive
 from .estimation.model import Linearised as Linearised
 from .estimation.model import MachineModel as MachineModel
 from .estimation.model import UserModel as UserModel
@@ -20,15 +23,11 @@ from .estimation.posterior import Posterior as Posterior
 from .estimation.problem import Problem as Problem
 from .estimation.problem import linearised_fit as linearised_fit
 from .estimation.setup import FitSetup as FitSetup
-from .estimation.setup import Stage as Stage
 from .estimation.setup import load_setup as load_setup
 from .estimation.solving import Solution as Solution
 from .estimation.solving import sobol_starts as sobol_starts
 from .estimation.solving import solve as solve
 from .estimation.solving import solve_from as solve_from
-from .estimation.stages import as_fit_setup as as_fit_setup
-from .estimation.stages import smooth as smooth
-from .estimation.stages import whole_drive as whole_drive
 from .estimation.unknowns import Prior as Prior
 from .estimation.unknowns import Unknown as Unknown
 from .estimation.unknowns import Unknowns as Unknowns
@@ -38,10 +37,7 @@ from .fitting import drawn_drive as drawn_drive
 from .fitting import fit as fit
 from .identifying import identify as identify
 from .identifying import runs_to_fit as runs_to_fit
-from .resampling import CrossValidation as CrossValidation
-from .resampling import cross_validate as cross_validate
-from .resampling import folds_tables as folds_tables
-from .stage_fit import StageFit as StageFit
+from .optimum import Optimum as Optimum
 from .statistics.determination import Identifiability as Identifiability
 from .statistics.determination import identifiability_of as identifiability_of
 from .statistics.experiment_design import Advice as Advice

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any, Unpack, cast
 
 import numpy as np
 from numpy.typing import ArrayLike
-from pydantic import Field, model_validator
+from pydantic import BaseModel, Field, model_validator
 from tomlkit import dumps
 
 from swashplate.__about__ import __version__
@@ -28,22 +28,20 @@ from swashplate.identification import tables
 from swashplate.identification.band import Band, speed_band
 from swashplate.identification.diagnostics.verdict import REQUIRED, Verdict, assess_fit
 from swashplate.identification.estimation.drive_model import limits_unreached
+from swashplate.identification.estimation.fit_problem import (
+    Parameters,
+    problem_of,
+    smooth,
+    with_estimates,
+)
 from swashplate.identification.estimation.model_setup import ModelSetup
 from swashplate.identification.estimation.posterior import Posterior
 from swashplate.identification.estimation.problem import Problem
-from swashplate.identification.estimation.setup import FitSetup, Stage, setup_text
+from swashplate.identification.estimation.setup import FitSetup, setup_text
 from swashplate.identification.estimation.solving import Solution
-from swashplate.identification.estimation.stages import Parameters
 from swashplate.identification.estimation.unknowns import Unknown, Unknowns
-from swashplate.identification.fitting import (
-    Estimated,
-    Fit,
-    SolvedStage,
-    fingerprint,
-    staged,
-)
-from swashplate.identification.resampling import CrossValidation, folds_tables
-from swashplate.identification.stage_fit import Interval, StageFit
+from swashplate.identification.fitting import Estimated, Fit, fingerprint
+from swashplate.identification.optimum import Interval, Optimum
 from swashplate.identification.statistics.experiment_design import Commands, commands_each_way
 from swashplate.identification.statistics.intervals import Estimate, estimates_of, intervals_of
 from swashplate.identification.statistics.left_open import posterior_of
@@ -64,7 +62,7 @@ from swashplate.parameters import (
 )
 from swashplate.progress import working
 from swashplate.results import folded, listing
-from swashplate.tables import Table, count, write_text
+from swashplate.tables import Table, write_text
 
 if TYPE_CHECKING:
     import polars
@@ -98,9 +96,8 @@ class Identification(Estimated):
 
     campaign: Campaign
     fit: Fit
-    """Stage by stage what was estimated, from what it began."""
+    """What was estimated, and from what it began."""
     profiles: Sequence[Profile] = ()
-    folds: CrossValidation | None = None
     notes: Mapping[str, str] = field(default_factory=dict)
     """Versions, seed, campaign."""
     required: float = REQUIRED
@@ -116,10 +113,10 @@ class Identification(Estimated):
     def to_polars(self) -> polars.DataFrame:
         """What was estimated, one row for each parameter, SI; what ``estimates.csv`` holds.
 
-        Columns are stage, parameter, unit, nominal, value, lower and upper (ends of the 95 %
+        Columns are parameter, unit, nominal, value, lower and upper (ends of the 95 %
         interval), standard_error and status.
         """
-        return tables.all_estimates(self.fit.stages).to_polars()
+        return tables.all_estimates(self.fit).to_polars()
 
     @cached_property
     def drive(self) -> Drive:
@@ -151,7 +148,7 @@ class Identification(Estimated):
         if self.stored is not None and self.stored.posterior is not None:
             return self.stored.posterior
         try:
-            return posterior_of(self.fit.stages)
+            return posterior_of(self.fit)
         except InputError:  # no more samples than unknowns
             return Posterior((), np.zeros((0, 0)))
 
@@ -160,12 +157,10 @@ class Identification(Estimated):
         """What it can be used for."""
         if self.stored is not None and self.stored.holds_for(self):
             return self.stored.verdict
-        planned = [stage.name for stage in self.fit.setup.stages]
         with working("Judging the fit"):
             return assess_fit(
-                self.fit.stages,
+                self.fit,
                 self.predicted,
-                planned=planned,
                 required=self.required,
                 posterior=self.posterior,
             )
@@ -209,23 +204,23 @@ class Identification(Estimated):
 
         See `swashplate.analysis.key_numbers`.
         """
-        if self.fit.stages[0].stage.part == "model":
+        if self.fit.setup.part == "model":
             return None
         if self.stored is not None and self.stored.numbers == dict(self.fit.parameters.numbers):
             return self.stored.key_numbers
         # by name, as it stands above this package
         answers = import_module("swashplate.analysis")
         with working("Computing the numbers that matter"):
-            return cast("KeyNumbers", answers.numbers_of_fit(self.drive, self.fit.stages))
+            return cast("KeyNumbers", answers.numbers_of_fit(self.drive, self.fit))
 
     def tables(self) -> list[Table]:
-        """Numbers that matter, stated errors, estimates, profiles, runs, cross-validation."""
+        """Numbers that matter, stated errors, estimates, profiles, runs."""
         part_tables = [table for part in parts_of(self) for table in part.tables]
         return [*_number_tables(self), self.verdict.table(), *part_tables]
 
     def summary(self) -> str:
         """Text: the verdict and the numbers that matter, then the tables of the command ``fit``."""
-        single = "\n".join(tables.single_runs_line(self.fit.stages))
+        single = "\n".join(tables.single_runs_line(self.fit))
         numbers = [*map(str, _number_tables(self)), *(self.key_numbers or _NONE).sentences]
         parts = [self.verdict.summary(), "\n".join(numbers), *map(str, parts_of(self)), single]
         return "\n\n".join(part for part in parts if part)
@@ -237,7 +232,7 @@ class Identification(Estimated):
                 estimates += "".join(table._repr_html_() for table in part.tables)
             visible_tables = () if part.opened else part.tables
             details += folded(part.title, visible_tables, [*part.remarks, *part.sentences])
-        for line in tables.single_runs_line(self.fit.stages):
+        for line in tables.single_runs_line(self.fit):
             estimates += f"<p>{escape(line)}</p>"
         numbers = "".join(table._repr_html_() for table in _number_tables(self))
         numbers += listing((self.key_numbers or _NONE).sentences)
@@ -373,18 +368,11 @@ class Identification(Estimated):
             interpolation=self.fit.runs[0].input.interpolation,
             nominal=dict(start.numbers) if isinstance(start, ModelSetup) else dump_set(start),
             setup=self.fit.setup,
-            stages=tuple(
-                StoredStage(
-                    name=stage.stage.name,
-                    unknowns=stage.problem.unknowns.items,
-                    solution=stage.solution,
-                    starts=stage.starts,
-                    intervals=intervals_of(stage),
-                )
-                for stage in self.fit.stages
-            ),
+            unknowns=self.fit.problem.unknowns.items,
+            solution=self.fit.solution,
+            starts=self.fit.starts,
+            intervals=intervals_of(self.fit),
             profiles=tuple(self.profiles),
-            folds=self.folds,
             notes=dict(self.notes),
             verdict=StoredVerdict(
                 verdict=self.verdict,
@@ -402,13 +390,13 @@ class Identification(Estimated):
         Of a fitted one the source is campaign, date and 95 % interval; of a fixed one that of the
         set which the fit began from. The title of one that is not usable says so. A machine that
         began at the start for any machine is called like its axis. Estimates and limits that no
-        run reached are computed for this, once for each stage.
+        run reached are computed for this.
         """
         fitted_set = self.fit.drive.parameters
         nominal = self.fit.nominal
         assert isinstance(nominal, ParameterSet)
         today = f"{date.today():%d %b %Y}"
-        ends = _interval_words(self.fit.stages, fitted_set)
+        ends = _interval_words(self.fit, fitted_set)
         parameters = dict(fitted_set.parameters)
         for symbol, parameter in parameters.items():
             if symbol in ends:
@@ -418,7 +406,7 @@ class Identification(Estimated):
                 earlier_source = nominal.parameters.get(symbol, parameter).source
                 source = f"{nominal.name}: {earlier_source}" if earlier_source else nominal.name
                 parameters[symbol] = replace(parameter, status="fixed", source=source)
-        fitted = len(self.fit.stages[0].problem.experiments)
+        fitted = len(self.fit.problem.experiments)
         title = f"{self.campaign.title}: fitted to {fitted} runs, {today}"
         if not self.verdict.usable:
             title += f". {self.verdict.headline.rstrip('.')}"
@@ -447,21 +435,18 @@ def parts_of(result: Identification) -> list[tables.FitPart]:
     notes += [f"{run.name}: {sentence}." for run in fit.runs for sentence in run.notes]
     doubts = [f"! {sentence}" for sentence in fit.doubts]
     parts = [tables.FitPart("Runs", (), (), notes), tables.FitPart("Doubts", (), doubts)]
-    parts += map(tables.stage_part, fit.stages)
+    parts.append(tables.estimates_part(fit))
     if result.profiles:
         sentences = [sentence for profile in result.profiles for sentence in profile.sentences()]
-        table = tables.profiles_table(result.profiles, fit.stages)
+        table = tables.profiles_table(result.profiles, fit)
         parts.append(tables.FitPart("Profile likelihoods", [table], (), sentences))
-    parts.append(tables.fixed_part(fit.stages, fit.nominal))
-    fitted = tables.runs_tables([quality for stage in fit.stages for quality in stage.runs])
+    parts.append(tables.fixed_part(fit))
+    fitted = tables.runs_tables(fit.qualities)
     parts.append(tables.FitPart("Errors of fitted runs", fitted, heading="Runs that were fitted"))
     if result.predicted:
         errors = tables.runs_tables(result.predicted)
         heading = "Runs that were held out and predicted"
         parts.append(tables.FitPart("Errors of held-out runs", errors, heading=heading))
-    if result.folds is not None:
-        held_out, _ = folds_tables(result.folds, fit.stages)
-        parts.append(tables.FitPart("Cross-validation", [held_out], (), result.folds.sentences()))
     return [part for part in parts if part.tables or part.remarks or part.sentences]
 
 
@@ -507,23 +492,20 @@ def motion_of(runs: Iterable[Experiment]) -> Motion:
     return "rod" if units and units <= {"m", "m/s"} else "shaft"
 
 
-def _interval_words(stages: Sequence[StageFit], fitted: ParameterSet) -> dict[str, list[str]]:
+def _interval_words(fit: Optimum, fitted: ParameterSet) -> dict[str, list[str]]:
     """Intervals of the fitted parameters in words, by symbol."""
     texts_by_symbol: dict[str, list[str]] = {}
-    for stage in stages:
-        unknowns = stage.problem.unknowns
-        for estimate, unknown in zip(estimates_of(stage), unknowns, strict=True):
-            if unknown.kind == "force":
-                forces = ("Z19", "Z20", "Z21", "Z22")
-                texts_by_symbol |= {symbol: ["from the fitted forces"] for symbol in forces}
-            elif unknown.run is None:
-                ends = " to ".join(filter(None, estimate.ends()))
-                for target in (target for target in unknown.targets if target in fitted.numbers):
-                    side = target.rpartition("_")[2]
-                    side = f"{side} " if side in ("plus", "minus") else ""
-                    texts_by_symbol.setdefault(fitted.definitions.find(target).symbol, []).append(
-                        f"{side}{ends}"
-                    )
+    for estimate, unknown in zip(estimates_of(fit), fit.problem.unknowns, strict=True):
+        if unknown.kind == "force":
+            forces = ("Z19", "Z20", "Z21", "Z22")
+            texts_by_symbol |= {symbol: ["from the fitted forces"] for symbol in forces}
+        elif unknown.run is None:
+            ends = " to ".join(filter(None, estimate.ends()))
+            for target in (target for target in unknown.targets if target in fitted.numbers):
+                side = target.rpartition("_")[2]
+                side = f"{side} " if side in ("plus", "minus") else ""
+                symbol = fitted.definitions.find(target).symbol
+                texts_by_symbol.setdefault(symbol, []).append(f"{side}{ends}")
     return texts_by_symbol
 
 
@@ -541,18 +523,6 @@ def versions() -> dict[str, str]:
 
 
 # --- files ----------------------------------------------------------------------------------------
-
-
-class StoredStage(FileTable):
-    """End of a stage, and its starts."""
-
-    name: str
-    unknowns: tuple[Unknown, ...]
-    """With what their priors are worth."""
-    solution: Solution
-    starts: tuple[Solution, ...]
-    intervals: tuple[Interval, ...] | None = None
-    """Of the unknowns; None in a file of a version that did not store them."""
 
 
 class StoredVerdict(FileTable):
@@ -593,26 +563,35 @@ class FitFile(Document):
     nominal: str | dict[str, float]
     """What the fit began from: a drive's parameter file, or the numbers of a user-defined model."""
     setup: FitSetup
-    stages: tuple[StoredStage, ...]
-    """Fewer than the fit setup has if the fit was interrupted."""
-    profiles: tuple[Profile | tuple[str, Profile], ...]
-    """Behind the name of their stage in older files, which do not name the unknown."""
-    folds: CrossValidation | None
+    unknowns: tuple[Unknown, ...]
+    """With what their priors are worth."""
+    solution: Solution
+    starts: tuple[Solution, ...]
+    intervals: tuple[Interval, ...] | None = None
+    """Of the unknowns; None if they were never computed."""
+    profiles: tuple[Profile, ...]
     notes: dict[str, str]
     verdict: StoredVerdict | None = None
     """None in a file of a version that did not store it."""
 
+    @model_validator(mode="before")
+    @classmethod
+    def _of_an_earlier_version(cls, content: Any) -> Any:
+        if isinstance(content, Mapping) and "stages" in content:
+            raise ValueError("it is a fit in stages, of an earlier version: fit again")
+        return content
+
     @model_validator(mode="after")
     def _fitted(self) -> FitFile:
-        planned = len(self.setup.stages)
-        if not 1 <= len(self.stages) <= planned:
-            raise ValueError(
-                f"it holds {count(len(self.stages), 'stage')} of the {planned} in its fit setup: "
-                "fit again"
-            )
         if not self.runs:
             raise ValueError("it names no run that was fitted: fit again")
         return self
+
+
+class _VerdictAlone(BaseModel):
+    """What every version's file has of a verdict."""
+
+    verdict: StoredVerdict | None = None
 
 
 def read_verdict(path: str | Path) -> StoredVerdict | None:
@@ -620,7 +599,7 @@ def read_verdict(path: str | Path) -> StoredVerdict | None:
 
     A `FileError` or `ParameterError` if the file is not one that `Identification.save` wrote.
     """
-    return read_json(path, FitFile, strict=False).verdict
+    return read_json(path, _VerdictAlone, strict=False).verdict
 
 
 def _loaded(
@@ -638,19 +617,21 @@ def _loaded(
     campaign = _campaign_of(path, file, tests)
     runs = _runs_of(path, file, campaign)
     nominal = _nominal_of(path, file, model, runs)
-    entries = iter(file.stages)
-
-    def solved(stage: Stage, problem: Problem) -> SolvedStage:
-        return _stored_stage(path, next(entries), stage, problem)
-
-    fitted = file.setup.model_copy(update={"stages": file.setup.stages[: len(file.stages)]})
-    stages = staged(fitted, nominal, runs, solved, threads=threads)
-    result = Fit(file.setup, nominal, runs, stages)
+    problem = _stored_problem(path, file, nominal, runs, threads)
+    result = Fit(
+        setup=file.setup,
+        nominal=nominal,
+        runs=runs,
+        problem=problem,
+        solution=file.solution,
+        parameters=with_estimates(smooth(nominal), problem, file.solution.vector),
+        starts=file.starts,
+        stored=file.intervals,
+    )
     return Identification(
         campaign,
         result,
-        profiles=_profiles_of(path, file, result),
-        folds=file.folds,
+        profiles=_profiles_of(path, file, problem),
         notes=file.notes,
         required=REQUIRED if file.verdict is None else file.verdict.required,
         stored=file.verdict,
@@ -706,44 +687,40 @@ def _nominal_of(
     return nominal
 
 
-def _stored_stage(path: Path, stored: StoredStage, stage: Stage, problem: Problem) -> SolvedStage:
-    """A stage as it was stored; refused unless it has the unknowns of the problem."""
-    lengths = {stored.solution.vector.size, len(stored.unknowns)}
-    if stored.intervals is not None:
-        lengths.add(len(stored.intervals))
-    has_same_unknowns = _identities(stored.unknowns) == _identities(problem.unknowns)
-    if stored.name != stage.name or not has_same_unknowns or len(lengths) > 1:
-        raise FileError(
-            f"{path}: stage {stored.name} has other parameters than its fit setup: fit again."
-        )
-    unknowns = Unknowns(stored.unknowns)
+def _stored_problem(
+    path: Path,
+    file: FitFile,
+    nominal: Parameters,
+    runs: Sequence[Experiment],
+    threads: int | None,
+) -> Problem:
+    """The problem of a stored fit; refused unless it has the unknowns that were stored."""
+    problem = problem_of(file.setup, smooth(nominal), runs, threads=threads)
+    lengths = {file.solution.vector.size, len(file.unknowns)}
+    if file.intervals is not None:
+        lengths.add(len(file.intervals))
+    has_same_unknowns = _identities(file.unknowns) == _identities(problem.unknowns)
+    if not has_same_unknowns or len(lengths) > 1:
+        raise FileError(f"{path} has other parameters than its fit setup: fit again.")
+    unknowns = Unknowns(file.unknowns)
     low, high = unknowns.bounds
     rounding = 1e-6 * (high - low)
-    vector = stored.solution.vector
+    vector = file.solution.vector
     if np.any(vector < low - rounding) or np.any(vector > high + rounding):
-        raise FileError(f"{path}: stage {stored.name} ends outside its bounds: fit again.")
-    return SolvedStage(
-        problem=replace(problem, unknowns=unknowns),
-        solution=stored.solution,
-        starts=stored.starts,
-        intervals=stored.intervals,
-    )
+        raise FileError(f"{path} ends outside its bounds: fit again.")
+    return replace(problem, unknowns=unknowns)
 
 
 def _identities(unknowns: Iterable[Unknown]) -> list[tuple[str, str | None, str, str | None]]:
     return [(unknown.name, unknown.run, unknown.kind, unknown.channel) for unknown in unknowns]
 
 
-def _profiles_of(path: Path, file: FitFile, result: Fit) -> list[Profile]:
-    """The stored profiles, with their stages and unknowns."""
+def _profiles_of(path: Path, file: FitFile, problem: Problem) -> list[Profile]:
+    """The stored profiles with their unknowns."""
     profiles = list[Profile]()
-    for entry in file.profiles:
-        stage, profile = (entry.stage, entry) if isinstance(entry, Profile) else entry
-        if stage not in {each.stage.name for each in result.stages}:
-            raise FileError(f"{path}: it has a profile of a stage '{stage}', which was not fitted.")
-        unknowns = result.stage(stage).problem.unknowns
-        if not 0 <= profile.index < len(unknowns.names):
-            raise FileError(f"{path}: stage {stage} has no parameter {profile.index + 1}.")
-        name, unknown = unknowns.names[profile.index], unknowns.items[profile.index]
-        profiles.append(replace(profile, stage=stage, name=name, unknown=unknown))
+    for profile in file.profiles:
+        if not 0 <= profile.index < len(problem.unknowns):
+            raise FileError(f"{path} has a profile of a parameter that it does not have.")
+        name, unknown = problem.unknowns.names[profile.index], problem.unknowns.items[profile.index]
+        profiles.append(replace(profile, name=name, unknown=unknown))
     return profiles

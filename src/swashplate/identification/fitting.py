@@ -1,4 +1,4 @@
-"""The fit of a drive, stage after stage, or of a user-defined model."""
+"""The fit of a drive, or of a user-defined model: the search, from its starts to its optimum."""
 
 from __future__ import annotations
 
@@ -32,10 +32,17 @@ from swashplate.identification.diagnostics.data_checks import (
 )
 from swashplate.identification.estimation.between_samples import settle
 from swashplate.identification.estimation.drive_model import DriveModel, with_card_filter
+from swashplate.identification.estimation.fit_problem import (
+    Parameters,
+    as_fit_setup,
+    problem_of,
+    smooth,
+    with_estimates,
+)
 from swashplate.identification.estimation.model import EquationModel, MachineModel, UserModel
 from swashplate.identification.estimation.model_setup import ModelSetup
 from swashplate.identification.estimation.problem import Loss, Problem
-from swashplate.identification.estimation.setup import FitSetup, FreeParameters, Stage
+from swashplate.identification.estimation.setup import FitSetup, FreeParameters
 from swashplate.identification.estimation.solving import (
     Progress,
     Solution,
@@ -44,18 +51,9 @@ from swashplate.identification.estimation.solving import (
     solve,
     solve_from,
 )
-from swashplate.identification.estimation.stages import (
-    Parameters,
-    as_fit_setup,
-    smooth,
-    stage_problem,
-    start_currents_of,
-    with_estimates,
-)
-from swashplate.identification.estimation.unknowns import Prior
 from swashplate.identification.lateness import is_in_question, lateness_of, with_lateness
-from swashplate.identification.stage_fit import Interval, StageFit
-from swashplate.identification.statistics.intervals import Estimate, uncertainty_of, weighed
+from swashplate.identification.optimum import Optimum
+from swashplate.identification.statistics.intervals import Estimate, weighed
 from swashplate.machine import Model as Equations
 from swashplate.parameters import SIDES, ParameterSet
 from swashplate.progress import LOGGER, working
@@ -103,32 +101,30 @@ OF_FORCES = ("Z19", "Z21")
 """Coefficients of the solenoids that are drawn if a fit setup frees forces: those of odd powers."""
 
 
-class SolvedStage(NamedTuple):
-    """Solution of a stage, and its starts."""
+class _Solved(NamedTuple):
+    """A problem, its solution, and its starts."""
 
     problem: Problem
     """With its priors weighed."""
     solution: Solution
     starts: tuple[Solution, ...] = ()
     """End of each start, if there was more than one."""
-    intervals: tuple[Interval, ...] | None = None
-    """What is known of each unknown's error, if it was computed before."""
 
 
 @dataclass(frozen=True)
 class Search:
-    """Starts besides the nominal one, in each stage."""
+    """Starts besides the nominal one."""
 
     starts: int
     """Sobol points over the bounds, besides the nominal values."""
     seed: int = 0
     executor: Executor = field(default_factory=Serial)
     store: Path | None = None
-    """Folder that keeps each result as it is ready, a folder in it for each stage."""
+    """Folder that keeps each result as it is ready."""
     resume: bool = False
     """Take what is in the store instead of computing it again."""
-    watch: Callable[[str, Solution, int], None] | None = None
-    """Called with the stage, each result and how many there are by now."""
+    watch: Callable[[Solution, int], None] | None = None
+    """Called with each result and how many there are by now."""
 
 
 class Estimated(Tabular, ABC):
@@ -168,78 +164,47 @@ class Estimated(Tabular, ABC):
 
 
 @dataclass(frozen=True, eq=False)
-class Fit(Estimated):
+class Fit(Optimum, Estimated):
     """A fitted drive, or a user-defined model, and how it came about.
 
     Estimates are there by name: ``fit["Z8"].standard_error``.
     """
 
-    setup: FitSetup
-    nominal: Parameters
-    runs: tuple[Experiment, ...] = field(repr=False)
-    """Those that were fitted."""
-    stages: tuple[StageFit, ...]
     doubts: tuple[str, ...] = ()
     """What the runs lack, in sentences, if they could be fitted all the same."""
-
-    @property
-    def parameters(self) -> Parameters:
-        """The fitted parameters."""
-        return self.stages[-1].parameters
-
-    @property
-    def drive(self) -> Drive:
-        """The fitted drive; refused if a user-defined model was fitted."""
-        return self.stages[-1].drive
-
-    @property
-    def interrupted(self) -> bool:
-        """Whether it was stopped before the last stage's optimum."""
-        return self.stages[-1].solution.interrupted
 
     @cached_property
     def estimates(self) -> Mapping[str, Estimate]:
         """Every number of the machine by name, estimated or fixed, and those of single runs."""
-        return tables.estimates_by_name(self.stages)
+        return tables.estimates_by_name(self)
 
     def to_polars(self) -> polars.DataFrame:
         """What was estimated, one row for each parameter, SI.
 
-        Columns are stage, parameter, unit, nominal, value, lower and upper (ends of the 95 %
-        interval), standard_error and status.
+        Columns are parameter, unit, nominal, value, lower and upper (ends of the 95 % interval),
+        standard_error and status.
         """
-        return tables.all_estimates(self.stages).to_polars()
-
-    def stage(self, name: str) -> StageFit:
-        """The stage of a name; an `UnknownNameError` if there is none."""
-        for stage in self.stages:
-            if stage.stage.name == name:
-                return stage
-        names = ", ".join(stage.stage.name for stage in self.stages)
-        raise UnknownNameError(f"The fit has no stage '{name}'; there are {names}.")
+        return tables.all_estimates(self).to_polars()
 
     def tables(self) -> list[Table]:
-        """Estimates with their intervals, stage by stage, then the errors of each fitted run."""
-        runs = [quality for stage in self.stages for quality in stage.runs]
-        errors = tables.runs_tables(runs)
+        """Estimates with their intervals, then the errors of each fitted run."""
+        errors = tables.runs_tables(self.qualities)
         errors = [replace(table, title=f"{table.title}, fitted runs") for table in errors]
-        return [*map(tables.estimates_table, self.stages), *errors]
+        return [tables.estimates_table(self), *errors]
 
     @property
     def sentences(self) -> tuple[str, ...]:
-        """How each stage ended, what its estimates lack, and what stayed fixed."""
-        sentences = list(self.doubts)
-        for part in map(tables.stage_part, self.stages):
-            sentences += [*part.remarks, *part.sentences]
-        unknowns = [unknown for stage in self.stages for unknown in stage.problem.unknowns]
-        jumps = {unknown.label for unknown in unknowns if unknown.kind == "instant"}
+        """How the search ended, what the estimates lack, and what stayed fixed."""
+        part = tables.estimates_part(self)
+        sentences = [*self.doubts, *part.remarks, *part.sentences]
+        jumps = {each.label for each in self.problem.unknowns if each.kind == "instant"}
         if jumps:
             times = count(len(jumps), "time")
             sentences.append(
                 f"Commands jump {times} between two samples: the instant is estimated."
             )
-        sentences += tables.single_runs_line(self.stages)
-        fixed = tables.fixed_part(self.stages, self.nominal)
+        sentences += tables.single_runs_line(self)
+        fixed = tables.fixed_part(self)
         return (*sentences, *fixed.remarks, *fixed.sentences)
 
 
@@ -256,7 +221,7 @@ def fit(
     max_evaluations: int = 600,
     threads: int | None = None,
     search: Search | None = None,
-    watch: Callable[[str, Progress], None] | None = None,
+    watch: Callable[[Progress], None] | None = None,
 ) -> Fit:
     """Estimate the parameters of a drive, or of a user-defined model, from tests.
 
@@ -273,13 +238,13 @@ def fit(
     tests : Campaign or sequence of Experiment
         The runs to fit; of a campaign those with the role ``"fit"``.
     free : FitSetup, str, path or mapping
-        What to estimate. Of a drive a fit setup: a `FitSetup`, a packaged one by name, a TOML
-        file, or a mapping as of `as_fit_setup`. Of a user-defined model a mapping to (low,
-        nominal, high) or an `Unknown`, see `ModelSetup`.
+        What to estimate. Of a drive a fit setup: a `FitSetup`, a TOML file, or a mapping as of
+        `as_fit_setup`. Of a user-defined model a mapping to (low, nominal, high) or an `Unknown`,
+        see `ModelSetup`.
     channels, noise, fixed : optional
         Of a user-defined model, as of `ModelSetup`.
     loss, tolerance, max_evaluations :
-        As of `solving.solve`, in each stage.
+        As of `solving.solve`.
     threads : int, optional
         Threads over experiments; all cores by default. The result does not depend on it.
     search : Search, optional
@@ -287,9 +252,9 @@ def fit(
         residuals are five times as large as their known measurement error, until one of them is
         not, and if none explains two fifths of what was measured, the fit is refused; `Search(0)`
         tries none.
-        Ctrl-C during them ends the whole fit, with the best start of that stage as its last result.
+        Ctrl-C during them ends the fit, with the best start as its result.
     watch : callable, optional
-        Called with the stage's name and each of its iterations.
+        Called with each iteration.
 
     Raises
     ------
@@ -331,63 +296,69 @@ def fit(
     nominal, setup = stated.nominal, stated.setup
     doubts += stated.doubts
 
-    def solved(stage: Stage, problem: Problem) -> SolvedStage:
-        def seen(now: Progress) -> None:
-            work.at(f"evaluation {now.evaluations}, cost {now.cost:.5g}")
-            if watch is not None:
-                watch(stage.name, now)
+    def solved(setup: FitSetup, start_at: Mapping[str, float]) -> Fit:
+        """The optimum for a fit setup, from some values if they are given."""
+        problem = problem_of(setup, smooth(nominal), runs, threads=threads)
+        refuse_unsound(check_rank("The fit", problem), InputError)
+        with working("Searching") as work:
 
-        refuse_unsound(check_rank(f"Stage {stage.name}", problem), InputError)
-        limits: dict[str, Any] = {"tolerance": tolerance, "max_evaluations": max_evaluations}
-        with working(f"Stage {stage.name}") as work:
-            if stage.has_spreads:
+            def seen(now: Progress) -> None:
+                work.at(f"evaluation {now.evaluations}, cost {now.cost:.5g}")
+                if watch is not None:
+                    watch(now)
+
+            limits: dict[str, Any] = {"tolerance": tolerance, "max_evaluations": max_evaluations}
+            start = None
+            if setup.has_spreads:
                 limits |= {"tolerance": max(tolerance, WITH_PRIORS), "cliffs": CLIFFS}
-            solve_stage = partial(solve, loss=loss, watch=seen, keep_best=True, **limits)
-            start = problem.unknowns.vector_of(near) if near and stage.has_spreads else None
-            result = _solved(stage, problem, solve_stage, search, doubts, start)
+                start = problem.unknowns.vector_of(start_at) if start_at else None
+            solver = partial(solve, loss=loss, watch=seen, keep_best=True, **limits)
+            problem, solution, starts = _solved(setup, problem, solver, search, doubts, start)
         LOGGER.info(
-            "Stage %s: %s after %d evaluations, cost %.5g",
-            stage.name,
-            result.solution.message,
-            result.solution.evaluations,
-            result.solution.cost,
+            "Search: %s after %d evaluations, cost %.5g",
+            solution.message,
+            solution.evaluations,
+            solution.cost,
         )
-        return result
+        return Fit(
+            setup=setup,
+            nominal=nominal,
+            runs=tuple(runs),
+            problem=problem,
+            solution=solution,
+            parameters=with_estimates(smooth(nominal), problem, solution.vector),
+            starts=starts,
+        )
 
     with working(f"Fitting {nominal.name}"):
         settled = settle(runs, smooth(nominal), setup, loss=loss, threads=threads)
-        runs, near = settled.runs, dict(settled.near)
+        runs = settled.runs
         doubts += settled.sentences
-        stages = staged(setup, nominal, runs, solved, threads=threads)
-        late = {}
-        if is_in_question(setup, nominal):
-            late = lateness_of(stages[0], runs, smooth(nominal))
+        result = solved(setup, settled.near)
+        late = lateness_of(result, smooth(nominal)) if is_in_question(setup, nominal) else {}
         if late:
-            setup = with_lateness(setup)
-            near = stages[0].values | late
-            stages = staged(setup, nominal, runs, solved, threads=threads)
-    doubts += tuple(each for stage in stages for each in _unlike(stage, nominal.name))
-    return Fit(setup, nominal, tuple(runs), stages, doubts)
+            result = solved(with_lateness(setup), result.values | late)
+    return replace(result, doubts=(*doubts, *_unlike(result)))
 
 
-def _unlike(stage: StageFit, drive: str) -> Iterator[str]:
+def _unlike(fit: Optimum) -> Iterator[str]:
     """A sentence if the tests drive numbers far from those of the drive that the fit began with."""
-    if not stage.stage.has_spreads:
+    if not fit.setup.has_spreads:
         return
     far = [
         f"{unknown.name} {abs(pull):.2g} deviations {'above' if pull > 0.0 else 'below'}"
-        for unknown, number in zip(stage.problem.unknowns, stage.solution.vector, strict=True)
+        for unknown, number in zip(fit.problem.unknowns, fit.solution.vector, strict=True)
         if unknown.run is None and abs(pull := unknown.pull(float(number))) > FAR
     ]
     if far:
         yield (
-            f"The machine is not like {drive}, from whose numbers differ {listed(far)}. Begin from "
-            "a drive that it is like, or let 'swashplate guess' read one off the logs."
+            f"The machine is not like {fit.nominal.name}, from whose numbers differ {listed(far)}. "
+            "Begin from a drive that it is like, or let 'swashplate guess' read one off the logs."
         )
 
 
 class _Stated(NamedTuple):
-    """Stages to be fitted, and doubts about them."""
+    """What is to be fitted, and doubts about it."""
 
     nominal: Parameters
     setup: FitSetup
@@ -400,7 +371,7 @@ def _of_drive(
     """A drive, the card's filter in the form that is fitted; unsound runs are refused."""
     if free is None:
         raise InputError(
-            "A fit of a drive needs its free parameters, such as 'hoist' or {'Z8': (0.5, 2)}; "
+            "A fit of a drive needs its free parameters, such as {'Z8': (0.5, 2)}; "
             "swashplate.identify takes drive and fit setup from the campaign."
         )
     setup = as_fit_setup(free, runs, parameters.definitions)
@@ -417,112 +388,45 @@ def _of_model(model: ModelSetup, runs: Sequence[Experiment]) -> _Stated:
     return _Stated(nominal, nominal.setup, doubts)
 
 
-def staged(
-    setup: FitSetup,
-    nominal: Parameters,
-    runs: Sequence[Experiment],
-    solved: Callable[[Stage, Problem], SolvedStage],
-    *,
-    threads: int | None = None,
-) -> tuple[StageFit, ...]:
-    """The stages of a fit setup, each from what the ones before found, until one is interrupted."""
-    parameters = smooth(nominal)
-    stages = list[StageFit]()
-    starts = dict[str, Mapping[str, float]]()
-    instants = dict[tuple[str, str], Prior]()
-    for stage in setup.stages:
-        problem = stage_problem(
-            stage,
-            parameters,
-            runs,
-            threads=threads,
-            uncertain=setup.standard_uncertainty,
-            starts=starts,
-            instants=instants,
-        )
-        result = solved(stage, problem)
-        problem, vector = result.problem, result.solution.vector
-        parameters = with_estimates(parameters, problem, vector)
-        starts |= start_currents_of(problem, vector)
-        stages.append(
-            StageFit(
-                stage,
-                problem,
-                result.solution,
-                parameters,
-                starts=result.starts,
-                earlier=tuple(stages),
-                stored=result.intervals,
-            )
-        )
-        if result.solution.interrupted:
-            break
-        # what was stored has the priors of the stages after it, too
-        if stage is not setup.stages[-1] and result.intervals is None:
-            instants |= _instants_found(stages[-1])
-    return tuple(stages)
-
-
-def _instants_found(stage: StageFit) -> dict[tuple[str, str], Prior]:
-    """Estimated instants of edges of a stage, by run and name."""
-    unknowns = stage.problem.unknowns
-    numbers = [k for k, unknown in enumerate(unknowns) if unknown.kind == "instant"]
-    if not numbers:
-        return {}
-    values = unknowns.at(stage.solution.vector).estimates
-    errors = uncertainty_of(stage).quoted.standard_errors * unknowns.scales
-    priors = dict[tuple[str, str], Prior]()
-    for k in numbers:
-        unknown = unknowns[k]
-        assert unknown.prior is not None
-        assert unknown.run is not None
-        deviation = unknown.prior.deviation
-        error = min(float(errors[k]), deviation)
-        if not error > 0.0:
-            error = deviation
-        priors[unknown.run, unknown.name] = Prior(float(values[k]), error)
-    return priors
-
-
 def _solved(
-    stage: Stage,
+    setup: FitSetup,
     problem: Problem,
     solver: partial[Solution],
     search: Search | None,
     doubts: Sequence[str],
     start: Array | None = None,
-) -> SolvedStage:
-    """See `SolvedStage`; a search without other starts begins at `start` if there is one."""
+) -> _Solved:
+    """See `_Solved`; a search without other starts begins at `start` if there is one."""
     limits = {key: solver.keywords[key] for key in ("tolerance", "max_evaluations")}
     if search is not None and search.starts:
-        solutions = _from_starts(stage, problem, search, limits)
+        solutions = _from_starts(setup, problem, search, limits)
         solution = solutions[0]
         planned = 1 + search.starts
     else:
         hopeless = None
         if search is None and isinstance(problem.model, EquationModel):
             hopeless = partial(_is_hopeless, problem)
-        if stage.has_spreads and start is None:
+        if setup.has_spreads and start is None:
             start = approached(problem, loss=solver.keywords["loss"])
         first = solver
-        if stage.has_spreads:
+        if setup.has_spreads:
             first = partial(solver, tolerance=max(limits["tolerance"], BEFORE_WEIGHING))
         solution = first(problem, start, hopeless=hopeless)
         solutions = ()
         planned = 1 + OTHERS
     if (
         search is None
-        and not stage.has_spreads
+        and not setup.has_spreads
         and solution.loss == "linear"
         and _unexplained(problem, solution)
     ):
-        solutions, planned = _from_other_starts(stage, problem, solution, limits)
+        solutions, planned = _from_other_starts(problem, solution, limits)
     if solutions:
         best = min(solutions, key=lambda solution: solution.cost)
         if solution.given_up and len(solutions) == planned:
             share = share_explained(problem, best.vector)
             if share < LEAST_EXPLAINED:
-                raise InputError(_no_fit(stage, problem, planned, share, doubts))
+                raise InputError(_no_fit(problem, planned, share, doubts))
         if len(solutions) < planned:
             message = f"interrupted after {len(solutions)} of {planned} starts: the best of them"
             solution = replace(best, converged=False, interrupted=True, message=message)
@@ -532,11 +436,11 @@ def _solved(
         # what the residuals are worth is known only now
         problem = weighed(problem, solution.vector)
         solution = solver(problem, solution.vector)
-    return SolvedStage(problem, solution, solutions)
+    return _Solved(problem, solution, solutions)
 
 
 def _from_starts(
-    stage: Stage, problem: Problem, search: Search, limits: dict[str, Any]
+    setup: FitSetup, problem: Problem, search: Search, limits: dict[str, Any]
 ) -> tuple[Solution, ...]:
     """Solutions from the nominal values and from the starts of a search."""
     # starts run side by side, so each of them runs on one thread
@@ -545,25 +449,24 @@ def _from_starts(
         single_threaded,
         [problem.start, *sobol_starts(single_threaded, search.starts, search.seed)],
         executor=search.executor,
-        store=None if search.store is None else search.store / stage.name,
-        origin=_origin(stage, problem, limits),
+        store=search.store,
+        origin=_origin(setup, problem, limits),
         resume=search.resume,
-        watch=None if search.watch is None else partial(search.watch, stage.name),
+        watch=search.watch,
         **limits,
     )
 
 
 def _from_other_starts(
-    stage: Stage, problem: Problem, solution: Solution, limits: Mapping[str, float]
+    problem: Problem, solution: Solution, limits: Mapping[str, float]
 ) -> tuple[tuple[Solution, ...], int]:
     """A solution that leaves too much unexplained and those from a few other starts.
 
     Beside them how many were planned.
     """
     LOGGER.info(
-        "Stage %s: residuals exceed %g times their known measurement error: up to %d more "
+        "Residuals exceed %g times their known measurement error: up to %d more "
         "starts (starts=0 tries none)",
-        stage.name,
         UNEXPLAINED,
         OTHERS,
     )
@@ -626,14 +529,12 @@ def _is_hopeless(problem: Problem, vector: Array) -> bool:
     return share_explained(problem, vector) < LEAST_EXPLAINED
 
 
-def _no_fit(
-    stage: Stage, problem: Problem, starts: int, share: float, doubts: Sequence[str]
-) -> str:
+def _no_fit(problem: Problem, starts: int, share: float, doubts: Sequence[str]) -> str:
     """Sentence that no search comes near the measurements, and on what to look at."""
     channels, percentage = listed(problem.channels), 100.0 * max(share, 0.0)
     best = f"the best of {starts} starts" if starts > 1 else "the search"
     sentence = (
-        f"Stage {stage.name} does not fit: {best} explains {percentage:.0f} % of the variance of "
+        f"Nothing fits: {best} explains {percentage:.0f} % of the variance of "
         f"{channels}. Inspect the runs with 'swashplate campaign plot': did this command move the "
         "machine, do jumps or resets cut a signal, are kinds, units and signs right? Start from "
         "another drive with --from, or search anyway with --starts 20 (in Python search = "
@@ -670,7 +571,7 @@ def _explained(problem: Problem, solution: Solution) -> bool:
     return isfinite(solution.cost) and not _unexplained(problem, solution)
 
 
-def _origin(stage: Stage, problem: Problem, limits: Mapping[str, float]) -> dict[str, str]:
+def _origin(setup: FitSetup, problem: Problem, limits: Mapping[str, float]) -> dict[str, str]:
     """Fingerprints of all that the result of a start depends on."""
     model = repr(problem.model) if isinstance(problem.model, UserModel) else ""
     fixed = sorted(problem.fixed.items()), sorted(problem.zeros.items())
@@ -680,7 +581,7 @@ def _origin(stage: Stage, problem: Problem, limits: Mapping[str, float]) -> dict
         forms = drive.pressure_root, drive.coulomb_sign, drive.rate, sorted(drive.options)
         nominal = sorted(drive.numbers.items()), forms
     marks = {
-        "stage of the fit setup": stage.model_dump_json(),
+        "fit setup": setup.model_dump_json(),
         "tolerances": sorted(limits.items()),
         "nominal values": nominal,
         "runs and their weights": (problem.scales, [*map(fingerprint, problem.experiments)]),
@@ -731,8 +632,8 @@ def drawn_drive(nominal: Drive, setup: FitSetup, seed: int, *, spread: float = S
     """
     random = np.random.default_rng(seed)
     definitions = nominal.parameters.definitions
-    names = [name for stage in setup.stages for name in definitions.columns_of(stage.free)]
-    if any(stage.forces is not None for stage in setup.stages):
+    names = definitions.columns_of(setup.free)
+    if setup.forces is not None:
         names += definitions.columns_of(OF_FORCES)
     numbers = nominal.parameters.numbers
     factors = {name: float(np.exp(random.normal(0.0, spread))) for name in names}

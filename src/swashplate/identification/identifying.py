@@ -18,15 +18,13 @@ from swashplate.identification.assessment import Identification, versions
 from swashplate.identification.diagnostics.data_checks import refuse_unsound, spike_findings
 from swashplate.identification.diagnostics.verdict import REQUIRED
 from swashplate.identification.estimation.between_samples import doubt
+from swashplate.identification.estimation.fit_problem import Parameters, setup_of
 from swashplate.identification.estimation.model import MachineModel
 from swashplate.identification.estimation.model_setup import ModelSetup
 from swashplate.identification.estimation.problem import Loss
 from swashplate.identification.estimation.setup import FitSetup, FreeParameters
-from swashplate.identification.estimation.stages import Parameters, setup_of
 from swashplate.identification.fitting import Fit, Search, fit
-from swashplate.identification.resampling import cross_validate
-from swashplate.identification.stage_fit import StageFit
-from swashplate.identification.statistics.profiles import Profile, profiles_of
+from swashplate.identification.statistics.profiles import profiles_of
 from swashplate.machine import Model as Equations
 from swashplate.machine.fields import is_real
 from swashplate.parameters import ParameterSet, named_set
@@ -40,9 +38,7 @@ def identify(
     free: FreeParameters | None = None,
     *,
     axis: str | None = None,
-    joint: bool = False,
     starts: int | None = None,
-    folds: int = 0,
     profiles: str | Sequence[str] = (),
     seed: int = 0,
     loss: Loss = "linear",
@@ -54,7 +50,7 @@ def identify(
 ) -> Identification:
     """Identify a drive, or a user-defined model, from the tests of a campaign.
 
-    Fits the runs with the role ``"fit"``, stage after stage, predicts those with the role
+    Fits the runs with the role ``"fit"``, predicts those with the role
     ``"validate"``, and judges the result: what ``swashplate fit`` does, which calls this function.
 
     Parameters
@@ -67,25 +63,20 @@ def identify(
         model of equations or any object with `simulate`, with `free`; a `ModelSetup`; a Python file
         that states one.
     free : FitSetup, str, path or mapping, optional
-        What to estimate. By default the packaged fit setup of the campaign's drive. Or
-        another packaged one by its name, a TOML file, a `FitSetup`, or a mapping of the drive's
-        parameters to factors on their nominal values, ``{"Z8": (0.5, 2)}``; see
-        `swashplate.identification.as_fit_setup`. Of a user-defined model (low, nominal, high) by
-        name, see `ModelSetup`.
+        What to estimate. By default every number of the drive, known beforehand to within 30 %.
+        Or a TOML file, a `FitSetup`, or a mapping of the drive's parameters to factors on their
+        nominal values, ``{"Z8": (0.5, 2)}``; see `swashplate.identification.as_fit_setup`. Of a
+        user-defined model (low, nominal, high) by name, see `ModelSetup`.
     axis : str, optional
         The axis; needed if the campaign has several.
-    joint : bool
-        After the stages, estimate all parameters at once, through the whole drive.
     starts : int, optional
-        More starts, spread over the bounds; the best is refined. By default up to six are tried in
-        a stage whose residuals are five times as large as their known measurement error, until
+        More starts, spread over the bounds; the best is refined. By default up to six are tried if
+        residuals are five times as large as their known measurement error, until
         they no longer are; 0 tries none.
-    folds : int
-        Folds of a cross-validation; 0 for none.
     profiles : str or sequence of str
         Parameters to profile the cost along, by name, or ``"all"``.
     seed : int
-        Random seed of starts and folds.
+        Random seed of the starts.
     loss : {"linear", "soft_l1", "cauchy"}
         Robust loss functions reduce the weight of outliers.
     max_evaluations : int
@@ -93,7 +84,7 @@ def identify(
     required : float
         Largest stated error of a new maneuver, over the range of the signal, of a usable fit. [1]
     executor : Executor, optional
-        Of `swashplate.executors`, for starts, folds and profiles; one after another by
+        Of `swashplate.executors`, for starts and profiles; one after another by
         default. The result does not depend on it.
     store : path, optional
         Folder that keeps the result of each start as it is ready.
@@ -104,7 +95,7 @@ def identify(
     -------
     Identification
         Estimates by name, drive, verdict; `Identification.report` and `Identification.save` write
-        them. After Ctrl-C it is the best result so far, without folds and profiles.
+        them. After Ctrl-C it is the best result so far, without profiles.
 
     Raises
     ------
@@ -132,7 +123,6 @@ def identify(
     """
     _check_counts(
         starts=0 if starts is None else starts,
-        folds=folds,
         seed=seed,
         max_evaluations=max_evaluations,
     )
@@ -157,7 +147,7 @@ def identify(
     if starts is not None:
         folder = None if store is None else Path(store)
         search = Search(starts, seed, executor or Serial(), store=folder, resume=resume)
-    staged = result = fit(
+    result = fit(
         nominal,
         runs,
         setup,
@@ -166,38 +156,17 @@ def identify(
         search=search,
     )
     _check_profiles(result, profiles)
-    if joint and len(setup.stages) > 1 and not result.interrupted:
-        # from where the stages ended: from afar a joint fit is often caught on its way
-        result = fit(
-            result.parameters,
-            result.runs,
-            setup.joint(),
-            loss=loss,
-            max_evaluations=max_evaluations,
-        )
     if all(run.input.settled for run in runs):
-        doubts = doubt(result.runs, staged.nominal, staged.setup, loss=loss)
+        doubts = doubt(result.runs, result.nominal, result.setup, loss=loss)
         result = replace(result, doubts=(*result.doubts, *doubts))
     campaign = campaign.with_interpolation(axis, result.runs[0].input.interpolation)
     notes = {**versions(), "seed": str(seed), "campaign": str(campaign.path)}
     identification = Identification(campaign, result, notes=notes, required=required)
     if result.interrupted:
         return identification
-    if folds:
-        cross_validation = cross_validate(
-            staged.runs,
-            staged.nominal,
-            staged.setup,
-            folds=folds,
-            loss=loss,
-            executor=executor,
-            seed=seed,
-        )
-        identification = replace(identification, folds=cross_validation)
     if profiles:
-        curves = [
-            curve for stage in result.stages for curve in _profiles(stage, profiles, executor)
-        ]
+        names = None if "all" in profiles else profiles
+        curves = list(profiles_of(result, names, executor=executor).values())
         identification = replace(identification, profiles=curves)
     return identification
 
@@ -239,7 +208,7 @@ def _stated(
     free: FreeParameters | None,
     runs: Sequence[Experiment],
 ) -> tuple[Parameters, FitSetup]:
-    """The nominal parameters, and what is estimated of them in which stages."""
+    """The nominal parameters, and what is estimated of them."""
     if isinstance(model, str | Path) and Path(model).suffix == ".py":
         model = ModelSetup.from_file(model)
     if isinstance(model, ModelSetup):
@@ -272,17 +241,9 @@ def _stated(
 
 def _check_profiles(result: Fit, profiles: Sequence[str]) -> None:
     """Refuse names of profiles that the fit does not estimate."""
-    unknowns = [unknown for stage in result.stages for unknown in stage.problem.unknowns]
+    unknowns = result.problem.unknowns
     labels = [unknown.label for unknown in unknowns]
     for name in profiles:
         if name != "all" and name not in labels:
             machine = ", ".join(unknown.label for unknown in unknowns if unknown.run is None)
             raise InputError(f"There is no parameter '{name}'; there are {machine}.")
-
-
-def _profiles(stage: StageFit, profiles: Sequence[str], executor: Executor | None) -> list[Profile]:
-    """Profiles of the parameters of one stage that are named."""
-    names = None
-    if "all" not in profiles:
-        names = [name for name in profiles if name in stage.problem.unknowns.names]
-    return list(profiles_of(stage, names, executor=executor).values())

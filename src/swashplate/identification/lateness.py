@@ -7,17 +7,15 @@ are in question after each fit of a whole drive, and become free if they are mor
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 
-from swashplate.campaign import Experiment
 from swashplate.errors import DomainError
-from swashplate.identification.estimation.setup import FitSetup, Free, Stage
-from swashplate.identification.estimation.stages import Parameters, stage_problem
+from swashplate.identification.estimation.fit_problem import Parameters, problem_of
+from swashplate.identification.estimation.setup import FitSetup, Free
 from swashplate.identification.estimation.unknowns import Prior
-from swashplate.identification.stage_fit import StageFit
+from swashplate.identification.optimum import Optimum
 from swashplate.parameters import ParameterSet
 
 LATE = ("solenoid_delay", "solenoid_lag")
@@ -35,38 +33,33 @@ def is_in_question(setup: FitSetup, nominal: Parameters) -> bool:
     """Whether a setup takes the whole of a drive by its priors, and nobody stated a lateness."""
     return (
         isinstance(nominal, ParameterSet)
-        and len(setup.stages) == 1
-        and setup.stages[0].has_spreads
-        and setup.stages[0].part == "chain"
-        and not any(name in setup.stages[0].free or nominal.numbers.get(name) for name in LATE)
+        and setup.has_spreads
+        and setup.part == "chain"
+        and not any(name in setup.free or nominal.numbers.get(name) for name in LATE)
     )
 
 
 def with_lateness(setup: FitSetup) -> FitSetup:
     """The setup with a delay and a lag between current and spool, known to be near 0."""
     free = Free(bounds=(0.0, LARGEST), prior=Prior(0.0, USUAL))
-    (stage,) = setup.stages
-    late = stage.model_copy(update={"free": {**stage.free, **dict.fromkeys(LATE, free)}})
-    return setup.model_copy(update={"stages": (late,)})
+    return setup.model_copy(update={"free": {**setup.free, **dict.fromkeys(LATE, free)}})
 
 
-def lateness_of(
-    stage_fit: StageFit, runs: Sequence[Experiment], nominal: Parameters
-) -> dict[str, float]:
+def lateness_of(fit: Optimum, nominal: Parameters) -> dict[str, float]:
     """Delay and lag that the runs ask for, to begin a search at; none if they ask for none. [s]
 
     By one step of Gauss and Newton from where the fit ended, of all numbers with both beside them:
     their sum must matter, and the step must take a part of the cost away.
     """
-    late: Stage = with_lateness(FitSetup(stages=(stage_fit.stage,))).stages[0]
-    problem = stage_problem(late, nominal, runs, threads=stage_fit.problem.threads)
-    fitted = stage_fit.problem.unknowns
+    late = with_lateness(fit.setup)
+    problem = problem_of(late, nominal, fit.runs, threads=fit.problem.threads)
+    fitted = fit.problem.unknowns
     worths = [unknown.worth for unknown in fitted if unknown.prior is not None]
     usual = float(np.median(worths)) if worths else 1.0
     worth_of = {unknown.label: unknown.worth for unknown in fitted}
     items = tuple(replace(u, worth=worth_of.get(u.label, usual)) for u in problem.unknowns)
     problem = replace(problem, unknowns=replace(problem.unknowns, items=items))
-    start = problem.unknowns.vector_of(fitted.values(stage_fit.solution.vector))
+    start = problem.unknowns.vector_of(fitted.values(fit.solution.vector))
     try:
         residuals, jacobian = problem.evaluate(start)
     except DomainError:

@@ -12,10 +12,9 @@ from typing import NamedTuple
 from swashplate.campaign import CURRENTS, Channel, Experiment
 from swashplate.identification.estimation.drive_model import DriveModel, true_value
 from swashplate.identification.estimation.model_setup import ModelSetup
-from swashplate.identification.estimation.stages import Parameters
 from swashplate.identification.estimation.unknowns import Kind, Unknown
 from swashplate.identification.noise import CONFIDENCE_LEVEL
-from swashplate.identification.stage_fit import Interval, StageFit, Status
+from swashplate.identification.optimum import Interval, Optimum, Status
 from swashplate.identification.statistics.determination import (
     GAUGES,
     bounds_reached,
@@ -50,24 +49,23 @@ from swashplate.units import chosen_unit, display_unit
 
 
 def estimates_table(
-    stage: StageFit,
+    fit: Optimum,
     *,
     truth: ParameterSet | None = None,
     own: bool = False,
 ) -> Table:
-    """Estimates of a stage with their intervals.
+    """Estimates of a fit with their intervals.
 
     `truth` is what virtual tests were simulated with; with `own` the unknowns of single runs are
     meant, instead of those of the machine.
     """
-    unknowns = stage.problem.unknowns
+    unknowns = fit.problem.unknowns
     # in terminal, page and file, or nowhere
     truth_shown_in = "" if truth is None else "tpf"
     ends = f"{100.0 * CONFIDENCE_LEVEL:g} %"
     table = Table(
-        f"Stage {stage.stage.name}",
+        "Estimates",
         (
-            Column("stage", of="f"),
             Column("parameter"),
             Column("meaning", of="p"),
             UNIT if truth is None else Column("unit", of="pf"),
@@ -84,7 +82,7 @@ def estimates_table(
         ),
         si=True,
     )
-    for unknown, estimate in zip(unknowns, estimates_of(stage), strict=True):
+    for unknown, estimate in zip(unknowns, estimates_of(fit), strict=True):
         if (unknown.run is None) == own:
             continue
         value = estimate.value
@@ -93,8 +91,8 @@ def estimates_table(
         true = None
         holds = ""
         if truth is not None:
-            assert isinstance(stage.problem.model, DriveModel)
-            true = true_value(unknown, stage.problem.model, truth)
+            assert isinstance(fit.problem.model, DriveModel)
+            true = true_value(unknown, fit.problem.model, truth)
         texts: Sequence[str] = (f"{factor * value:.5g}", *estimate.ends(factor))
         if low is not None and high is not None:
             texts = spread(factor * value, factor * low, factor * high)
@@ -102,9 +100,8 @@ def estimates_table(
             inside = (-inf if low is None else low) <= true <= (inf if high is None else high)
             holds = "yes" if inside else "no"
         table.add(
-            stage.stage.name,
             estimate.name,
-            meaning_of(unknown, stage),
+            meaning_of(unknown, fit),
             *(() if truth is None else (Cell(unknown.unit, chosen_unit(unknown.unit).name),)),
             unknown.start,
             Cell(value, texts[0]),
@@ -129,14 +126,12 @@ def _half_width(value: float, low: float | None, high: float | None) -> str:
     return "includes 0" if low < 0.0 < high else f"±{percent(0.5 * (high - low), value)}"
 
 
-def profiles_table(profiles: Sequence[Profile], stages: Sequence[StageFit]) -> Table:
+def profiles_table(profiles: Sequence[Profile], fit: Optimum) -> Table:
     """Ends of the intervals of profile likelihoods; none if the cost does not rise enough."""
-    stage_of = {stage.stage.name: stage for stage in stages}
     ends = f"{100.0 * CONFIDENCE_LEVEL:g} %"
     table = Table(
         "Profile likelihoods, of the noise alone",
         (
-            Column("stage"),
             Column("parameter"),
             UNIT,
             Column("estimate", ".5g"),
@@ -146,16 +141,14 @@ def profiles_table(profiles: Sequence[Profile], stages: Sequence[StageFit]) -> T
         si=True,
     )
     for profile in profiles:
-        stage = stage_of[profile.stage]
-        unknown = stage.problem.unknowns.items[profile.index]
+        unknown = fit.problem.unknowns.items[profile.index]
         lower = profile.lower
         upper = profile.upper
         if profile.better is not None:  # of a point that is not the optimum there is no interval
             lower = upper = None
         table.add(
-            profile.stage,
             profile.name,
-            unknown.to_value(float(stage.solution.vector[profile.index])),
+            unknown.to_value(float(fit.solution.vector[profile.index])),
             None if lower is None else unknown.to_value(lower),
             None if upper is None else unknown.to_value(upper),
             unit=unknown.unit,
@@ -163,18 +156,17 @@ def profiles_table(profiles: Sequence[Profile], stages: Sequence[StageFit]) -> T
     return table
 
 
-def estimates_by_name(stages: Sequence[StageFit]) -> dict[str, Estimate]:
-    """Every number of a fit by its name: the estimates of each stage, then what stayed fixed.
+def estimates_by_name(fit: Optimum) -> dict[str, Estimate]:
+    """Every number of a fit by its name: what was estimated, then what stayed fixed.
 
     A parameter that is tied in both directions is there by its symbol and by both columns.
     """
     by_name: dict[str, Estimate] = {}
-    for stage in stages:
-        for unknown, estimate in zip(stage.problem.unknowns, estimates_of(stage), strict=True):
-            by_name[estimate.name] = estimate
-            if unknown.run is None:
-                by_name.update(dict.fromkeys(unknown.targets, estimate))
-    parameters, estimated = stages[-1].parameters, _estimated_columns(stages)
+    for unknown, estimate in zip(fit.problem.unknowns, estimates_of(fit), strict=True):
+        by_name[estimate.name] = estimate
+        if unknown.run is None:
+            by_name.update(dict.fromkeys(unknown.targets, estimate))
+    parameters, estimated = fit.parameters, _estimated_columns(fit)
     for name, value in parameters.numbers.items():
         unit = "" if isinstance(parameters, ModelSetup) else parameters[name].unit
         status: Status = "from the forces" if name in estimated else "fixed"
@@ -182,15 +174,15 @@ def estimates_by_name(stages: Sequence[StageFit]) -> dict[str, Estimate]:
     return by_name
 
 
-def all_estimates(stages: Sequence[StageFit]) -> Table:
-    """One table of what all stages estimated: of the machine, then of single runs."""
-    return joined([estimates_table(stage, own=own) for stage in stages for own in (False, True)])
+def all_estimates(fit: Optimum) -> Table:
+    """One table of what was estimated: of the machine, then of single runs."""
+    return joined([estimates_table(fit, own=own) for own in (False, True)])
 
 
-def truth_count(tables: Sequence[Table]) -> tuple[int, int]:
-    """How many intervals of tables with a truth contain it, and of how many."""
-    names = [column.name for column in tables[0].columns]
-    answers = [row.cells[names.index("holds")] for table in tables for row in table.rows]
+def truth_count(table: Table) -> tuple[int, int]:
+    """How many intervals of a table with a truth contain it, and of how many."""
+    names = [column.name for column in table.columns]
+    answers = [row.cells[names.index("holds")] for row in table.rows]
     holding = answers.count("yes")
     return holding, holding + answers.count("no")
 
@@ -204,16 +196,16 @@ MEANINGS: Mapping[Kind, str] = {
 """Meanings of unknowns of single runs."""
 
 
-def meaning_of(unknown: Unknown, stage: StageFit) -> str:
+def meaning_of(unknown: Unknown, fit: Optimum) -> str:
     """Meaning of an unknown, in words; empty if it has none."""
     if unknown.kind == "parameter":
         # names of a user-defined model are its own
-        return "" if stage.stage.part == "model" else meaning_of_parameter(unknown.name)
+        return "" if fit.setup.part == "model" else meaning_of_parameter(unknown.name)
     if unknown.kind == "zero":
         return f"free zero of {unknown.channel}"
     if unknown.kind == "force":
-        assert stage.stage.forces is not None
-        current = stage.stage.forces.currents[unknown.name]
+        assert fit.setup.forces is not None
+        current = fit.setup.forces.currents[unknown.name]
         direction = "positive" if current > 0.0 else "negative"
         return f"solenoid force {abs(current):g} A beyond the dead zone, {direction}"
     return MEANINGS[unknown.kind]
@@ -229,22 +221,18 @@ def meaning_of_parameter(name: str) -> str:
     return definition.name + (direction if definition.directional else "")
 
 
-def _estimated_columns(stages: Sequence[StageFit]) -> set[str]:
-    """Columns of the drive's parameters that some stage estimates, its forces included."""
-    problems = [stage.problem for stage in stages]
-    estimated = {
-        target for problem in problems for unknown in problem.unknowns for target in unknown.targets
-    }
-    forces = [problem.model.forces for problem in problems if isinstance(problem.model, DriveModel)]
-    return estimated.union(*(force.columns for force in forces if force is not None))
+def _estimated_columns(fit: Optimum) -> set[str]:
+    """Columns of the drive's parameters that are estimated, those of its forces included."""
+    estimated = {target for unknown in fit.problem.unknowns for target in unknown.targets}
+    return estimated.union(fit.setup.forces.columns if fit.setup.forces else ())
 
 
 def _is_estimated(symbol: str, estimated: Collection[str]) -> bool:
     return any(column in estimated for column in (symbol, f"{symbol}_plus", f"{symbol}_minus"))
 
 
-def fixed_table(stages: Sequence[StageFit], truth: ParameterSet | None = None) -> Table:
-    """The parameters that no stage estimates; `truth` as it is, in no other scales."""
+def fixed_table(fit: Optimum, truth: ParameterSet | None = None) -> Table:
+    """The parameters that are not estimated; `truth` as it is, in no other scales."""
     table = Table(
         "Fixed at their nominal values",
         (
@@ -258,8 +246,8 @@ def fixed_table(stages: Sequence[StageFit], truth: ParameterSet | None = None) -
         ),
         si=True,
     )
-    estimated = _estimated_columns(stages)
-    parameters = stages[-1].parameters
+    estimated = _estimated_columns(fit)
+    parameters = fit.parameters
     if isinstance(parameters, ModelSetup):
         for name, value in parameters.numbers.items():
             if name not in estimated:
@@ -295,17 +283,17 @@ def fixed_table(stages: Sequence[StageFit], truth: ParameterSet | None = None) -
     return table
 
 
-def fixed_line(stages: Sequence[StageFit], nominal: Parameters) -> str:
+def fixed_line(fit: Optimum) -> str:
     """The symbols that kept their nominal values, in a sentence."""
-    estimated = _estimated_columns(stages)
-    plain_names = (n.removesuffix("_plus").removesuffix("_minus") for n in nominal.numbers)
+    estimated = _estimated_columns(fit)
+    plain_names = (n.removesuffix("_plus").removesuffix("_minus") for n in fit.nominal.numbers)
     fixed = [name for name in dict.fromkeys(plain_names) if not _is_estimated(name, estimated)]
     return f"Fixed at their nominal values: {', '.join(fixed) or 'none'}."
 
 
-def unvalued_lines(stages: Sequence[StageFit]) -> list[str]:
+def unvalued_lines(fit: Optimum) -> list[str]:
     """A sentence on the parameters without a value of their own, if there are any."""
-    lost = [name for stage in stages for name in without_value(stage)]
+    lost = without_value(fit)
     if not lost:
         return []
     return [
@@ -315,7 +303,7 @@ def unvalued_lines(stages: Sequence[StageFit]) -> list[str]:
     ]
 
 
-def scales_words(fit: StageFit) -> str:
+def scales_words(fit: Optimum) -> str:
     """Sentence on the unit of the residuals of each channel."""
     parts = []
     for name, size in fit.problem.scales.items():
@@ -432,33 +420,33 @@ class FitPart(NamedTuple):
         return "\n\n".join(block for block in blocks if block)
 
 
-def stage_part(stage: StageFit) -> FitPart:
-    """Estimates of a stage, how it ended, and what its estimates lack."""
-    name, solution = stage.stage.name, stage.solution
+def estimates_part(fit: Optimum) -> FitPart:
+    """Estimates, how the search ended, and what the estimates lack."""
+    solution = fit.solution
     # what priors and tests say together determines every number: the former are told instead
-    determined: Sequence[str] = identifiability_of(stage).sentences()
-    if stage.stage.has_spreads:
-        determined = together_lines(stage)
+    determined: Sequence[str] = identifiability_of(fit).sentences()
+    if fit.setup.has_spreads:
+        determined = together_lines(fit)
     return FitPart(
-        f"Convergence of stage {name}, and validity of its intervals",
-        [estimates_table(stage)],
-        [f"{name}: {solution.message} after {solution.evaluations} evaluations."],
+        "Convergence, and validity of the intervals",
+        [estimates_table(fit)],
+        [f"Search: {solution.message} after {solution.evaluations} evaluations."],
         [
             *determined,
-            *uncertainty_of(stage).sentences(),
-            *bounds_reached(stage),
+            *uncertainty_of(fit).sentences(),
+            *bounds_reached(fit),
         ],
         opened=True,
     )
 
 
-def together_lines(stage: StageFit) -> list[str]:
+def together_lines(fit: Optimum) -> list[str]:
     """That numbers which are near those of a named drive were estimated together, and why."""
     lines = [
         "Each number is taken to be near that of the drive that the fit began with, and all are "
         "estimated together: a prediction uses what the tests show of them in common."
     ]
-    if not any(run.of_kind(*CURRENTS) for run in stage.problem.experiments):
+    if not any(run.of_kind(*CURRENTS) for run in fit.problem.experiments):
         lines.append(
             "No current was measured, so that the tests cannot tell the amplifier's numbers from "
             "the solenoids': only what they do together is known."
@@ -466,15 +454,14 @@ def together_lines(stage: StageFit) -> list[str]:
     return lines
 
 
-def fixed_part(stages: Sequence[StageFit], nominal: Parameters) -> FitPart:
+def fixed_part(fit: Optimum) -> FitPart:
     """What stayed as it was, and what has no value of its own."""
-    return FitPart("Fixed parameters", (), [fixed_line(stages, nominal)], unvalued_lines(stages))
+    return FitPart("Fixed parameters", (), [fixed_line(fit)], unvalued_lines(fit))
 
 
-def single_runs_line(stages: Sequence[StageFit]) -> list[str]:
+def single_runs_line(fit: Optimum) -> list[str]:
     """A sentence on the numbers of single runs, which no table for people shows, if any."""
-    unknowns = [unknown for stage in stages for unknown in stage.problem.unknowns]
-    names = [unknown.label for unknown in unknowns if unknown.run is not None]
+    names = [unknown.label for unknown in fit.problem.unknowns if unknown.run is not None]
     if not names:
         return []
     numbers = count(len(names), "number of a single run", "numbers of single runs")

@@ -24,10 +24,10 @@ from swashplate.identification.estimation.drive_model import (
     edges_problem,
     with_edges,
 )
+from swashplate.identification.estimation.fit_problem import Parameters
 from swashplate.identification.estimation.model_setup import ModelSetup
 from swashplate.identification.estimation.problem import Problem
 from swashplate.identification.estimation.solving import solve
-from swashplate.identification.estimation.stages import Parameters
 from swashplate.identification.noise import LONGEST, Grid, correlation_length, grid_of, pair_sums
 from swashplate.parameters import HasParameters, ParameterSet, set_of
 from swashplate.results import Result, figures

@@ -24,7 +24,7 @@ from swashplate.identification.estimation.model import EquationModel, linearised
 from swashplate.identification.estimation.problem import Problem
 from swashplate.identification.estimation.solving import Solution, solve
 from swashplate.identification.estimation.unknowns import Unknown, Unknowns
-from swashplate.identification.stage_fit import StageFit
+from swashplate.identification.optimum import Optimum
 from swashplate.identification.statistics.effects import (
     HYSTERESIS,
     Changes,
@@ -93,7 +93,7 @@ class CandidateCause(Result):
     most: float
     """Sizes that are plausible. [SI, or 1]"""
     freed: Callable[[float], Problem]
-    """The problem of the stage with it, for its size to first order."""
+    """The problem with it, for its size to first order."""
     states: Callable[[float], str]
     """A clause that says what would be wrong, for a size."""
     advice: str
@@ -101,44 +101,46 @@ class CandidateCause(Result):
     """Unknown that the refit estimates it by; without one it stays at its size."""
 
 
-def causes_of(stages: Sequence[StageFit]) -> tuple[Cause, ...] | None:
-    """What explains the residuals of the first stage for which anything does.
+def causes_of(fit: Optimum) -> tuple[Cause, ...] | None:
+    """What explains the residuals of a fit.
 
     Parameters
     ----------
-    stages : sequence of StageFit
-        All stages of the fit.
+    fit : Optimum
 
     Returns
     -------
     tuple of Cause, or None
         At most `NAMED`, the largest share first: each removes at least half of the squared
         residuals in a refit, and is of a plausible size. Empty if none does; None if more than half
-        of the squares are noise in each stage, or a model is not one of equations.
+        of the squares are noise, or the model is not one of equations.
 
     Notes
     -----
     Rao's score test (Rao 1948) says which are tried first: the derivative of the residuals by each
     cause, freed of what the estimates can make up for, is projected on the residuals.
     """
-    causes: tuple[Cause, ...] | None = None
-    for stage in stages:
-        # a robust loss has taken what stands out already; any object with simulate may take minutes
-        quick = isinstance(stage.problem.model, EquationModel)
-        if stage.solution.loss != "linear" or not quick:
-            continue
-        original_squares = squares_of(stage.problem, stage.solution.vector)
-        if original_squares.noise_share >= EXPLAINED:
-            continue
-        causes = _causes_of_stage(stage, original_squares)
-        if causes:
-            # what an earlier stage lacks, the later ones inherit
-            break
-    return causes
+    # a robust loss has taken what stands out already; any object with simulate may take minutes
+    if fit.solution.loss != "linear" or not isinstance(fit.problem.model, EquationModel):
+        return None
+    original_squares = squares_of(fit.problem, fit.solution.vector)
+    if original_squares.noise_share >= EXPLAINED:
+        return None
+    plausible = [
+        score for score in _scores(fit) if score.candidate.least < score.size < score.candidate.most
+    ]
+    plausible.sort(key=lambda score: -score.share)
+    causes = list[Cause]()
+    for score in plausible[:TRIED]:
+        cause = _refitted(fit, score, original_squares)
+        if cause is not None:
+            causes.append(cause)
+    causes.sort(key=lambda cause: -cause.share)
+    return tuple(causes[:NAMED])
 
 
 class Squares(NamedTuple):
-    """Sums of squared residuals of a stage."""
+    """Sums of squared residuals of a fit."""
 
     slow: float
     """Of their means over `BLOCK`."""
@@ -175,23 +177,6 @@ def squares_of(problem: Problem, vector: Array) -> Squares:
     return Squares(slow, max(total - slow, 0.0), samples / max(blocks, 1.0))
 
 
-def _causes_of_stage(stage: StageFit, original_squares: Squares) -> tuple[Cause, ...]:
-    """Causes of one stage's residuals, the largest share first."""
-    plausible = [
-        score
-        for score in _scores(stage)
-        if score.candidate.least < score.size < score.candidate.most
-    ]
-    plausible.sort(key=lambda score: -score.share)
-    causes = list[Cause]()
-    for score in plausible[:TRIED]:
-        cause = _refitted(stage, score, original_squares)
-        if cause is not None:
-            causes.append(cause)
-    causes.sort(key=lambda cause: -cause.share)
-    return tuple(causes[:NAMED])
-
-
 # --- to first order -------------------------------------------------------------------------------
 
 
@@ -203,18 +188,18 @@ class _Score(NamedTuple):
     """Part of the squares that it removes to first order. [1]"""
 
 
-def _scores(stage: StageFit) -> Iterator[_Score]:
-    """Each candidate of a stage, to first order."""
-    fit = stage.linearised
-    candidates = {candidate.name: candidate for candidate in _candidates(stage)}
+def _scores(fit: Optimum) -> Iterator[_Score]:
+    """Each candidate, to first order."""
+    linearised_fit = fit.linearised
+    candidates = {candidate.name: candidate for candidate in _candidates(fit)}
     squares = dict[str, float]()
     products = dict[str, float]()
     along = dict[str, Array]()
     scales = dict[str, list[_RunScale]]()
-    jacobians = fit.jacobians()
-    for number in range(len(stage.problem.experiments)):
-        parts = RunParts(stage, number, jacobians)
-        for name, changes in _effects(stage, number):
+    jacobians = linearised_fit.jacobians()
+    for number in range(len(fit.problem.experiments)):
+        parts = RunParts(fit, number, jacobians)
+        for name, changes in _effects(fit, number):
             if name not in candidates:
                 continue
             for run, _, change in parts.weighted(changes):
@@ -235,7 +220,7 @@ def _scores(stage: StageFit) -> Iterator[_Score]:
         remaining = square - float(along[name] @ along[name])
         if square > 0.0 and remaining > SAME_DIRECTION**2 * square:
             size = -products[name] / remaining
-            share = products[name] ** 2 / (remaining * fit.squares)
+            share = products[name] ** 2 / (remaining * linearised_fit.squares)
             for channel, of_runs in scales.items():
                 if name == DRIFT.format(channel):
                     share *= _in_order(of_runs)
@@ -246,7 +231,7 @@ class _RunScale(NamedTuple):
     """What the residuals of one run say of the scale of its motion."""
 
     position: int
-    """Of the run among all of its stage."""
+    """Of the run among all."""
     product: float
     """Of motion and residuals."""
     square: float
@@ -272,28 +257,28 @@ def _in_order(runs: Sequence[_RunScale]) -> float:
     return max(1.0 - (1.0 - line / total) * (scales.size - 1) / (scales.size - 2), 0.0)
 
 
-def _effects(stage: StageFit, number: int) -> Iterator[tuple[str, Changes]]:
+def _effects(fit: Optimum, number: int) -> Iterator[tuple[str, Changes]]:
     """By what the residuals of one run change with one unit of each candidate."""
-    problem = stage.problem
+    problem = fit.problem
     experiment = problem.experiments[number]
-    simulation = SimulatedRun(stage, number)
+    simulation = SimulatedRun(fit, number)
     outputs = simulation.of(experiment)
     position = number / max(len(problem.experiments) - 1, 1) - 0.5
     for name in problem.channels:
         if name in outputs and name in experiment.channels:
             for effect, change in _of_channel(experiment, name, outputs[name], position).items():
                 yield effect, {name: change}
-    if _drives(stage, experiment):
+    if _drives(fit, experiment):
         yield from _effects_of_command(simulation, experiment, outputs)
-    width = stage.stage.current_hysteresis
+    width = fit.setup.current_hysteresis
     if width > 0.0:
         late = simulation.behind_hysteresis(experiment)
         # half of the width is the parameter
         yield "solenoid_hysteresis", {name: 2.0 * late[name] / width for name in late}
-    names = fixed_numbers(stage)
+    names = fixed_numbers(fit)
     if names:
-        values = problem.model_values(stage.solution.vector, number)
-        by = linearised(source_of(stage)(experiment), values, experiment, names)
+        values = problem.model_values(fit.solution.vector, number)
+        by = linearised(source_of(fit)(experiment), values, experiment, names)
         for k, name in enumerate(names):
             yield name, {channel: part.by[:, k] for channel, part in by.items()}
 
@@ -364,19 +349,19 @@ def behind_lag(time: Array, values: Array, lag: float = SMALL_LAG) -> Array:
 # --- what is looked for ---------------------------------------------------------------------------
 
 
-def _candidates(stage: StageFit) -> Iterator[CandidateCause]:
-    """Everything that may be freed in a stage."""
-    for name in stage.problem.channels:
-        yield from _of_readings(stage, name)
-    if isinstance(stage.problem.model, DriveModel):
-        yield from _of_commands(stage)
-        yield from _of_numbers(stage)
+def _candidates(fit: Optimum) -> Iterator[CandidateCause]:
+    """Everything that may be freed."""
+    for name in fit.problem.channels:
+        yield from _of_readings(fit, name)
+    if isinstance(fit.problem.model, DriveModel):
+        yield from _of_commands(fit)
+        yield from _of_numbers(fit)
 
 
-def _of_readings(stage: StageFit, name: str) -> Iterator[CandidateCause]:
+def _of_readings(fit: Optimum, name: str) -> Iterator[CandidateCause]:
     """What may be wrong with an instrument, or with the motion that it reads."""
-    channels = [run[name] for run in stage.problem.experiments if name in run.channels]
-    read = partial(_with_reading, stage, name)
+    channels = [run[name] for run in fit.problem.experiments if name in run.channels]
+    read = partial(_with_reading, fit, name)
     check = f"check the instrument of {name}"
     yield CandidateCause(
         name=SCALE.format(name),
@@ -442,13 +427,13 @@ def _lost_speed(unit: str, load: str, size: float) -> str:
     return f"{display.factor * size:.3g} {display.name} of speed are lost to {load}"
 
 
-def _of_commands(stage: StageFit) -> Iterator[CandidateCause]:
+def _of_commands(fit: Optimum) -> Iterator[CandidateCause]:
     """What may be wrong with the command, or with what takes it."""
     yield CandidateCause(
         name=COMMAND_GAIN,
         least=-0.3,
         most=0.3,
-        freed=partial(_with_command, stage, _gained),
+        freed=partial(_with_command, fit, _gained),
         # what acts is larger than what is read
         states=lambda size: (
             f"the command reads {percent(abs(size))} too {'little' if size > 0.0 else 'much'}"
@@ -459,22 +444,22 @@ def _of_commands(stage: StageFit) -> Iterator[CandidateCause]:
         name=COMMAND_LAG,
         least=0.0,
         most=LATEST,
-        freed=partial(_with_command, stage, _lagging),
+        freed=partial(_with_command, fit, _lagging),
         states=lambda size: f"the command lags by {_time(size)} on its way to the amplifier",
         advice="check for a filter or delay there",
     )
 
 
-def _of_numbers(stage: StageFit) -> Iterator[CandidateCause]:
+def _of_numbers(fit: Optimum) -> Iterator[CandidateCause]:
     """What of the drive is fixed, and the hysteresis that it is taken not to have."""
-    runs = stage.problem.experiments
-    largest = max(float(np.abs(_driving(stage, run)).max()) for run in runs)
+    runs = fit.problem.experiments
+    largest = max(float(np.abs(_driving(fit, run)).max()) for run in runs)
     name = "solenoid_hysteresis"
     yield CandidateCause(
         name=name,
         least=0.0,
         most=0.1 * largest,
-        freed=partial(_with_freed_number, stage, name),
+        freed=partial(_with_freed_number, fit, name),
         states=lambda size: (
             f"spool and solenoids have a friction or hysteresis of ±{1e3 * size:.3g} mA, "
             f"{percent(size / largest)} of the largest current"
@@ -482,8 +467,8 @@ def _of_numbers(stage: StageFit) -> Iterator[CandidateCause]:
         advice=f"check the dither; let the fit setup estimate {name}",
         free=name,
     )
-    numbers = stage.parameters.numbers
-    for name in fixed_numbers(stage):
+    numbers = fit.parameters.numbers
+    for name in fixed_numbers(fit):
         value, definition = numbers[name], CATALOGUE[COLUMNS[name]]
         low, high = sorted((-0.5 * value, value))
         if definition.unit == "s":
@@ -492,7 +477,7 @@ def _of_numbers(stage: StageFit) -> Iterator[CandidateCause]:
             name=name,
             least=low,
             most=high,
-            freed=partial(_with_freed_number, stage, name),
+            freed=partial(_with_freed_number, fit, name),
             states=partial(_other_value, name, definition.unit, value),
             advice=f"measure it ({definition.name}), or let the fit setup estimate it",
             free=name,
@@ -503,23 +488,18 @@ def _other_value(name: str, unit: str, stated: float, size: float) -> str:
     return f"{name} is {stated + size:.3g} {unit} instead of the stated {stated:.3g}"
 
 
-def fixed_numbers(stage: StageFit) -> list[str]:
-    """Columns of the drive that the stage's part has, that it does not estimate, and that act."""
-    model = stage.problem.model
+def fixed_numbers(fit: Optimum) -> list[str]:
+    """Columns of the drive that the fitted part has, that are not estimated, and that act."""
+    model = fit.problem.model
     if not isinstance(model, DriveModel):
         return []
-    taken = {
-        target
-        for earlier in (*stage.earlier, stage)
-        for unknown in earlier.problem.unknowns
-        for target in unknown.targets
-    }
+    taken = {target for unknown in fit.problem.unknowns for target in unknown.targets}
     if model.forces is not None:
         taken |= {name for name in COLUMNS if COLUMNS[name] in ("Z19", "Z20", "Z21", "Z22")}
     block = {"card": ("control_card",), "pump": ("pump_motor",)}.get(
         model.part, ("control_card", "pump_motor")
     )
-    numbers = stage.parameters.numbers
+    numbers = fit.parameters.numbers
     return [
         name
         for name, symbol in COLUMNS.items()
@@ -528,17 +508,17 @@ def fixed_numbers(stage: StageFit) -> list[str]:
     ]
 
 
-def _drives(stage: StageFit, experiment: Experiment) -> bool:
+def _drives(fit: Optimum, experiment: Experiment) -> bool:
     """Whether the command of a run acts on what is simulated of it."""
-    model = stage.problem.model
+    model = fit.problem.model
     if not isinstance(model, DriveModel) or experiment.input.kind != "voltage":
         return False
-    return model.part != "pump" or stage.stage.current == "simulated"
+    return model.part != "pump" or fit.setup.current == "simulated"
 
 
-def _driving(stage: StageFit, experiment: Experiment) -> Array:
+def _driving(fit: Optimum, experiment: Experiment) -> Array:
     """(m,) the current of a run, or its input. [A]"""
-    model = stage.problem.model
+    model = fit.problem.model
     assert isinstance(model, DriveModel)
     record = model.currents.get(experiment.name)
     return experiment.input.values if record is None else record.values
@@ -547,10 +527,10 @@ def _driving(stage: StageFit, experiment: Experiment) -> Array:
 # --- a refit with it ------------------------------------------------------------------------------
 
 
-def _refitted(stage: StageFit, score: _Score, original_squares: Squares) -> Cause | None:
+def _refitted(fit: Optimum, score: _Score, original_squares: Squares) -> Cause | None:
     """A candidate after a refit; None if it does not remove half of the squares."""
     candidate = score.candidate
-    best = _solved(stage, candidate, score.size, original_squares)
+    best = _solved(fit, candidate, score.size, original_squares)
     if best is None:
         return None
     size, share = best
@@ -559,7 +539,7 @@ def _refitted(stage: StageFit, score: _Score, original_squares: Squares) -> Caus
         curvature = share - 2.0 * score.share
         if curvature < 0.0 and abs(score.share / curvature + 1.0) > 0.1:
             other_size = -score.share / curvature * score.size
-            other_fit = _solved(stage, candidate, other_size, original_squares)
+            other_fit = _solved(fit, candidate, other_size, original_squares)
             if other_fit is not None and other_fit[1] > share:
                 size, share = other_fit
     if share < EXPLAINED or not candidate.least < size < candidate.most:
@@ -568,10 +548,10 @@ def _refitted(stage: StageFit, score: _Score, original_squares: Squares) -> Caus
 
 
 def _solved(
-    stage: StageFit, candidate: CandidateCause, size: float, original_squares: Squares
+    fit: Optimum, candidate: CandidateCause, size: float, original_squares: Squares
 ) -> tuple[float, float] | None:
     """Size of a candidate and the share of the squares that a refit removes; None if it fails."""
-    problem, vector = stage.problem, stage.solution.vector
+    problem, vector = fit.problem, fit.solution.vector
     try:
         freed = candidate.freed(size)
         start = freed.start.copy()
@@ -586,19 +566,19 @@ def _solved(
         return None
     if candidate.free:
         value = freed.unknowns.values(solution.vector)[candidate.free]
-        size = value - stage.parameters.numbers.get(candidate.free, 0.0)
+        size = value - fit.parameters.numbers.get(candidate.free, 0.0)
     return size, share
 
 
-def _with_freed_number(stage: StageFit, name: str, change: float) -> Problem:
+def _with_freed_number(fit: Optimum, name: str, change: float) -> Problem:
     """The problem with a fixed number of the drive as a further unknown.
 
     `change` is that of the number to first order, from which the refit starts.
     """
-    problem = stage.problem
+    problem = fit.problem
     model = problem.model
     assert isinstance(model, DriveModel)
-    value = stage.parameters.numbers.get(name, 0.0)
+    value = fit.parameters.numbers.get(name, 0.0)
     start = value + change
     if name in HYSTERESIS:
         freed = Unknown(name, start, 0.01 * start, 20.0 * start, log=True)
@@ -616,15 +596,13 @@ def _with_freed_number(stage: StageFit, name: str, change: float) -> Problem:
     return replace(problem, model=model, unknowns=unknowns)
 
 
-def _with_reading(
-    stage: StageFit, name: str, undo: Callable[..., Experiment], size: float
-) -> Problem:
+def _with_reading(fit: Optimum, name: str, undo: Callable[..., Experiment], size: float) -> Problem:
     """The problem with one channel as it would read without a fault of a size."""
-    problem, runs = stage.problem, list[Experiment]()
+    problem, runs = fit.problem, list[Experiment]()
     count = len(problem.experiments)
     for number, run in enumerate(problem.experiments):
         if name in run.channels:
-            output = problem.outputs(stage.solution.vector, number)[name]
+            output = problem.outputs(fit.solution.vector, number)[name]
             position = number / max(count - 1, 1) - 0.5
             run = undo(run, name, output, position, size)
         runs.append(run)
@@ -672,10 +650,10 @@ def _undone_loss(
 
 
 def _with_command(
-    stage: StageFit, change: Callable[[Array, Array, float], Array], size: float
+    fit: Optimum, change: Callable[[Array, Array, float], Array], size: float
 ) -> Problem:
     """The problem with another command, and the currents that follow from it."""
-    problem, model = stage.problem, stage.problem.model
+    problem, model = fit.problem, fit.problem.model
     assert isinstance(model, DriveModel)
     runs, currents = list[Experiment](), dict(model.currents)
     for run in problem.experiments:
@@ -685,11 +663,10 @@ def _with_command(
         shifted = replace(run, input=replace(signal, values=values))
         runs.append(shifted)
         if run.name in currents:
-            if _drives(stage, run):
-                start = model.starts.get(run.name, {})
-                currents[run.name] = simulated_current(shifted, model.parameters, start)
+            if _drives(fit, run):
+                currents[run.name] = simulated_current(shifted, model.parameters)
             else:
-                currents[run.name] = measured_current(shifted, stage.stage.current_scale)
+                currents[run.name] = measured_current(shifted, fit.setup.current_scale)
     return replace(problem, experiments=tuple(runs), model=replace(model, currents=currents))
 
 

@@ -29,11 +29,11 @@ from swashplate.identification.estimation.drive_model import (
     kinds_of,
     simulated_run,
 )
+from swashplate.identification.estimation.fit_problem import smooth
 from swashplate.identification.estimation.model import EquationModel
 from swashplate.identification.estimation.model_setup import ModelSetup
 from swashplate.identification.estimation.problem import Loss, Problem
 from swashplate.identification.estimation.setup import FitSetup
-from swashplate.identification.estimation.stages import smooth
 from swashplate.parameters import FULL_VOLTAGE, ParameterSet
 from swashplate.tables import count
 
@@ -105,13 +105,10 @@ def check_runs(experiments: Sequence[Experiment], nominal: ParameterSet) -> list
 
 
 def unfitted_currents(experiments: Sequence[Experiment], setup: FitSetup) -> list[Finding]:
-    """Warnings of currents of an amplifier that are measured, but that no stage uses."""
-    if any(stage.current == "measured" for stage in setup.stages):
+    """Warnings of currents of an amplifier that are measured, but that the fit does not use."""
+    if setup.current == "measured":
         return []
-    fitted_kinds = set[str]()
-    for stage in setup.stages:
-        fitted_kinds.update(stage.channels or kinds_of(stage.part))
-    unfitted_kinds = set(CURRENTS) - fitted_kinds
+    unfitted_kinds = set(CURRENTS).difference(setup.channels or kinds_of(setup.part))
     unfitted = dict.fromkeys(
         name
         for run in experiments
@@ -123,9 +120,8 @@ def unfitted_currents(experiments: Sequence[Experiment], setup: FitSetup) -> lis
         warning(
             None,
             name,
-            f"'{name}' is measured, but no stage fits it, so the amplifier is not known: let "
-            "'swashplate guess' write an initial drive and a fit setup whose first stage fits the "
-            "amplifier to it, and give them as --from and --setup.",
+            f"'{name}' is measured, but the fit setup leaves it out, so the amplifier is not "
+            "known: leave out --setup, or name the current among its channels.",
         )
         for name in unfitted
     ]

@@ -25,7 +25,7 @@ from scipy.special import stdtrit
 from swashplate.campaign import UNNAMED, Experiment
 from swashplate.identification.estimation.posterior import mean_square_bound
 from swashplate.identification.estimation.problem import LinearisedFit, LinearisedRun
-from swashplate.identification.stage_fit import StageFit
+from swashplate.identification.optimum import Optimum
 from swashplate.identification.validation import RunQuality
 from swashplate.results import Result
 
@@ -469,7 +469,7 @@ class PredictionError(Result):
 
 
 def prediction_errors(
-    stages: Sequence[StageFit],
+    fit: Optimum | None,
     predicted: Sequence[RunQuality],
     unexplained: Collection[str] = (),
     motions: Mapping[str, Sequence[LeftOpen]] = MappingProxyType({}),
@@ -478,8 +478,8 @@ def prediction_errors(
 
     Parameters
     ----------
-    stages : sequence of StageFit
-        Of the fit; none for a drive that is only compared with runs.
+    fit : Optimum or None
+        None for a drive that is only compared with runs.
     predicted : sequence of RunQuality
         Of runs that were held out, as `validation.predict` gives them.
     unexplained : collection of str
@@ -501,16 +501,14 @@ def prediction_errors(
     one exceeds with a probability of a tenth at most, whatever the distribution (Vovk, Gammerman
     and Shafer 2005, section 2.2), and of fewer than ten the largest.
     """
-    channels = dict.fromkeys(name for stage in stages for name in stage.problem.channels)
-    if not stages:
-        channels = dict.fromkeys(quality.channel for quality in predicted)
-    qualities = [*(quality for stage in stages for quality in stage.runs), *predicted]
+    channels = fit.problem.channels if fit else [quality.channel for quality in predicted]
+    qualities = [*(fit.qualities if fit else ()), *predicted]
     errors = list[PredictionError]()
-    for name in channels:
+    for name in dict.fromkeys(channels):
         measured = next(
             quality.experiment[name] for quality in qualities if quality.channel == name
         )
-        cells, reach = cells_of(errors_of_runs(name, stages, predicted))
+        cells, reach = cells_of(errors_of_runs(name, fit, predicted))
         if not cells:
             continue
         explained = [cell for cell in cells if cell.run not in unexplained]
@@ -609,25 +607,23 @@ def _shown_error(cells: Iterable[WindowCell]) -> float:
 
 
 def errors_of_runs(
-    channel: str, stages: Sequence[StageFit], predicted: Sequence[RunQuality]
+    channel: str, fit: Optimum | None, predicted: Sequence[RunQuality]
 ) -> ErrorsOfRuns:
     """A channel of all runs, as if the maneuver of each had been left out, or held out.
 
-    The linearised fit of each stage is computed if it is not there yet.
+    The linearised fit is computed if it is not there yet.
     """
     parts = list[tuple[RunQuality, Array | None, bool]]()
-    for stage in stages:
-        if channel not in stage.problem.channels:
-            continue
-        maneuvers = {run.name: maneuver_of(run) for run in stage.problem.experiments}
+    if fit is not None and channel in fit.problem.channels:
+        maneuvers = {run.name: maneuver_of(run) for run in fit.problem.experiments}
         errors = {
             run.name: error
-            for run, error in left_out(stage.linearised, maneuvers)
+            for run, error in left_out(fit.linearised, maneuvers)
             if run.channel == channel
         }
         parts += [
             (quality, errors[quality.experiment.name], False)
-            for quality in stage.runs
+            for quality in fit.qualities
             if quality.channel == channel
         ]
     parts += [(quality, None, True) for quality in predicted if quality.channel == channel]

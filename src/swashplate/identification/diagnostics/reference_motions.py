@@ -20,7 +20,7 @@ from swashplate.identification.diagnostics.discrepancy import TIME, ChannelError
 from swashplate.identification.estimation.drive_model import DriveModel
 from swashplate.identification.estimation.model import linearised as linearised_model
 from swashplate.identification.estimation.posterior import Posterior
-from swashplate.identification.stage_fit import StageFit
+from swashplate.identification.optimum import Optimum
 from swashplate.machine.marching import SOURCE_RATE
 
 Array = NDArray[np.float64]
@@ -78,23 +78,22 @@ def _sine(low: float, high: float, frequency: float) -> Array:
 
 
 def motions_left_open(
-    stages: Sequence[StageFit], posterior: Posterior, fastest: float
+    fit: Optimum, posterior: Posterior, fastest: float
 ) -> Iterator[tuple[ReferenceMotion, str, ChannelErrors]]:
     """What the posterior leaves open of each channel in each reference motion of a drive.
 
     Nothing of a user-defined model, or of a drive that does not hold under such a command.
     """
-    if not stages or not isinstance(stages[-1].problem.model, DriveModel) or not posterior.names:
+    if not isinstance(fit.problem.model, DriveModel) or not posterior.names:
         return
-    runs = {run.name: run for stage in stages for run in stage.problem.experiments}
-    by_voltage = [run for run in runs.values() if run.input.kind == "voltage"]
-    alike = by_voltage or list(runs.values())
+    runs = fit.problem.experiments
+    alike = [run for run in runs if run.input.kind == "voltage"] or runs
     template = max(alike, key=lambda run: len(run.channels))
     low = min(float(run.input.values.min()) for run in alike)
     high = max(float(run.input.values.max()) for run in alike)
     if low == high == 0.0:
         return
-    model = DriveModel(stages[-1].drive.parameters)
+    model = DriveModel(fit.drive.parameters)
     for motion in motions_between(low, high, fastest):
         experiment = _moved(template, motion.values)
         try:

@@ -37,7 +37,7 @@ from swashplate.identification.diagnostics.discrepancy import (
     without_runs,
 )
 from swashplate.identification.estimation.drive_model import DriveModel
-from swashplate.identification.stage_fit import StageFit
+from swashplate.identification.optimum import Optimum
 from swashplate.identification.validation import RunQuality
 
 Array = NDArray[np.float64]
@@ -60,7 +60,7 @@ by at least."""
 
 
 def unsound_data(
-    stages: Sequence[StageFit],
+    fit: Optimum | None,
     predicted: Sequence[RunQuality],
     expected: Sequence[PredictionError] = (),
     commands: CommandRange | None = None,
@@ -69,8 +69,8 @@ def unsound_data(
 
     Parameters
     ----------
-    stages : sequence of StageFit
-        All stages of the fit; none for a drive that is only compared with runs.
+    fit : Optimum or None
+        None for a drive that is only compared with runs.
     predicted : sequence of RunQuality
         Of runs that were held out.
     expected : sequence of PredictionError
@@ -79,17 +79,16 @@ def unsound_data(
         Of the runs that such a drive was fitted to.
     """
     findings = list[Finding]()
-    if stages:
-        fitted = {run.name: run for stage in stages for run in stage.problem.experiments}
+    if fit is not None:
+        fitted = {run.name: run for run in fit.problem.experiments}
         held_out = {quality.experiment.name: quality.experiment for quality in predicted}
         runs = list((fitted | held_out).values())
-        last = stages[-1]
-        if isinstance(last.problem.model, DriveModel):
-            findings += contradicting_runs(runs, last.drive.parameters)
+        if isinstance(fit.problem.model, DriveModel):
+            findings += contradicting_runs(runs, fit.drive.parameters)
         findings += clipped_channels(runs)
     for search in (
-        unexplained_runs(stages, predicted, expected, commands),
-        outlying_runs(stages, predicted),
+        unexplained_runs(fit, predicted, expected, commands),
+        outlying_runs(fit, predicted),
     ):
         named = {finding.run for finding in findings}
         findings += [finding for finding in search if finding.run not in named]
@@ -107,25 +106,24 @@ class JudgedRuns(NamedTuple):
     """Those whose command goes beyond the fitted ones, so that they are not compared."""
 
 
-def judged_runs(stages: Sequence[StageFit], predicted: Sequence[RunQuality]) -> JudgedRuns:
+def judged_runs(fit: Optimum, predicted: Sequence[RunQuality]) -> JudgedRuns:
     """The runs of a fit that are judged: those that move long enough to have an error."""
-    commands = commands_of([run for stage in stages for run in stage.problem.experiments])
+    commands = commands_of(fit.problem.experiments)
     beyond = [q.experiment.name for q in predicted if not commands.holds(q.experiment)]
     compared, held_out = 0, set[str]()
-    for stage in stages:
-        for channel in stage.problem.channels:
-            fitted, _ = cells_of(_records(stage, channel, (), ()))
-            compared = max(compared, len({cell.run for cell in fitted}))
-            if fitted:
-                cells, _ = cells_of(_records(None, channel, predicted, ()))
-                held_out |= {cell.run for cell in cells}
+    for channel in fit.problem.channels:
+        fitted, _ = cells_of(_records(fit, channel, (), ()))
+        compared = max(compared, len({cell.run for cell in fitted}))
+        if fitted:
+            cells, _ = cells_of(_records(None, channel, predicted, ()))
+            held_out |= {cell.run for cell in cells}
     return JudgedRuns(
         compared >= FEWEST_RUNS, len(held_out.difference(beyond)), tuple(dict.fromkeys(beyond))
     )
 
 
 def unexplained_runs(
-    stages: Sequence[StageFit],
+    fit: Optimum | None,
     predicted: Sequence[RunQuality],
     expected: Sequence[PredictionError] = (),
     commands: CommandRange | None = None,
@@ -134,7 +132,7 @@ def unexplained_runs(
 
     Parameters
     ----------
-    stages, predicted, expected, commands
+    fit, predicted, expected, commands
         As of `unsound_data`.
 
     Notes
@@ -149,15 +147,15 @@ def unexplained_runs(
     fitted runs is an extrapolation, of which they let one expect nothing: it is not judged here,
     but the stated error is no less than its own.
     """
-    if stages:
-        commands = commands_of([run for stage in stages for run in stage.problem.experiments])
+    if fit is not None:
+        commands = commands_of(fit.problem.experiments)
     predicted = [q for q in predicted if commands is None or commands.holds(q.experiment)]
     if not predicted:
         return
     named = set[str]()
     runs = {quality.experiment.name for quality in predicted}
     level = 1.0 - FALSE_ALARM / len(runs)
-    for expectation in _expectations(stages, predicted, expected, level):
+    for expectation in _expectations(fit, predicted, expected, level):
         for finding in _beyond(expectation):
             if finding.run not in named:
                 named.add(str(finding.run))
@@ -205,23 +203,22 @@ class _Expectation(NamedTuple):
 
 
 def _expectations(
-    stages: Sequence[StageFit],
+    fit: Optimum | None,
     predicted: Sequence[RunQuality],
     expected: Sequence[PredictionError],
     level: float,
 ) -> Iterator[_Expectation]:
     """Of each channel of a fit, or else of each channel whose error a fit stated."""
-    for stage in stages:
-        for channel in stage.problem.channels:
-            records = errors_of_runs(channel, [stage], predicted)
-            cells, _ = cells_of(records)
-            fitted = [cell for cell in cells if not cell.held_out]
-            if not fitted:
-                continue
-            median, limit = bound_of_variance(fitted, 0.5), bound_of_variance(fitted, level)
-            limit[1] += _gain(channel, predicted) ** 2 / 3.0
-            yield _Expectation(channel, records, cells, median, limit, level)
-    for stated in () if stages else expected:
+    for channel in fit.problem.channels if fit else ():
+        records = errors_of_runs(channel, fit, predicted)
+        cells, _ = cells_of(records)
+        fitted = [cell for cell in cells if not cell.held_out]
+        if not fitted:
+            continue
+        median, limit = bound_of_variance(fitted, 0.5), bound_of_variance(fitted, level)
+        limit[1] += _gain(channel, predicted) ** 2 / 3.0
+        yield _Expectation(channel, records, cells, median, limit, level)
+    for stated in () if fit else expected:
         records = ErrorsOfRuns(
             tuple((q, None, True) for q in predicted if q.channel == stated.channel)
         )
@@ -256,12 +253,12 @@ def _beyond(expectation: _Expectation) -> Iterator[Finding]:
         yield refusal(run, channel, _sentence(record, fault, records))
 
 
-def outlying_runs(stages: Sequence[StageFit], predicted: Sequence[RunQuality]) -> Iterator[Finding]:
+def outlying_runs(fit: Optimum | None, predicted: Sequence[RunQuality]) -> Iterator[Finding]:
     """Runs whose errors are far larger than those of the others, each once, and why.
 
     The runs of a fit are compared with each other; without a fit those that are predicted. A
     maneuver of which every run stands out shows what the model lacks, and not an unsound log. The
-    linearised fit of each stage is computed if it is not there yet.
+    linearised fit is computed if it is not there yet.
 
     Notes
     -----
@@ -272,19 +269,16 @@ def outlying_runs(stages: Sequence[StageFit], predicted: Sequence[RunQuality]) -
     Student's distribution, shared among the runs.
     """
     named = set[str]()
-    for stage in stages or (None,):
-        channels = [quality.channel for quality in predicted]
-        if stage is not None:
-            channels = list(stage.problem.channels)
-        for channel in dict.fromkeys(channels):
-            for finding in _outliers_by_channel(stage, channel, predicted):
-                if finding.run not in named:
-                    named.add(str(finding.run))
-                    yield finding
+    channels = fit.problem.channels if fit else [quality.channel for quality in predicted]
+    for channel in dict.fromkeys(channels):
+        for finding in _outliers_by_channel(fit, channel, predicted):
+            if finding.run not in named:
+                named.add(str(finding.run))
+                yield finding
 
 
 def _outliers_by_channel(
-    stage: StageFit | None, channel: str, predicted: Sequence[RunQuality]
+    fit: Optimum | None, channel: str, predicted: Sequence[RunQuality]
 ) -> list[Finding]:
     """The runs that one channel shows to be outliers, found one by one.
 
@@ -293,13 +287,13 @@ def _outliers_by_channel(
     findings = list[Finding]()
     excluded = list[str]()
     while True:
-        ratios = _ErrorRatios.of(_records(stage, channel, predicted, excluded), excluded)
+        ratios = _ErrorRatios.of(_records(fit, channel, predicted, excluded), excluded)
         suspect = None if ratios is None else ratios.farthest
         if suspect is None:
             break
         # the suspect must stand out from a fit that it does not influence
         excluded.append(suspect)
-        records = _records(stage, channel, predicted, excluded)
+        records = _records(fit, channel, predicted, excluded)
         ratios = _ErrorRatios.of(records, excluded)
         if ratios is None:
             break
@@ -319,7 +313,7 @@ def _outliers_by_channel(
 
 
 def _records(
-    stage: StageFit | None,
+    fit: Optimum | None,
     channel: str,
     predicted: Sequence[RunQuality],
     without: Sequence[str],
@@ -328,19 +322,19 @@ def _records(
 
     Without a fit of the runs that are predicted.
     """
-    if stage is None:
+    if fit is None:
         return ErrorsOfRuns(tuple((q, None, True) for q in predicted if q.channel == channel))
     errors = dict[str, Array]()
     if without:
         errors = {
             run.name: error
-            for run, error in without_runs(stage.linearised, without)
+            for run, error in without_runs(fit.linearised, without)
             if run.channel == channel
         }
     return ErrorsOfRuns(
         tuple(
             (quality, errors.get(quality.experiment.name), False)
-            for quality in stage.runs
+            for quality in fit.qualities
             if quality.channel == channel
         )
     )

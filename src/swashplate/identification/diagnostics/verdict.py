@@ -36,7 +36,7 @@ from swashplate.identification.estimation.drive_model import (
 )
 from swashplate.identification.estimation.posterior import Posterior
 from swashplate.identification.estimation.solving import Solution
-from swashplate.identification.stage_fit import StageFit
+from swashplate.identification.optimum import Optimum
 from swashplate.identification.statistics.determination import WIDE, weak_unknowns
 from swashplate.identification.validation import RunQuality, percent
 from swashplate.parameters import COLUMNS
@@ -72,7 +72,7 @@ class Verdict(Result):
     fitted: bool = True
     """Whether it is on a fit; False for a drive that is compared with runs."""
     unfinished: tuple[str, ...] = ()
-    """Clauses on stages that did not come to their end."""
+    """Clauses on a search that did not come to its end."""
     unsound: tuple[Finding, ...] = ()
     """Data that cannot be right, each with the line to write."""
     quotable: int = 0
@@ -311,10 +311,9 @@ class Verdict(Result):
 
 
 def assess_fit(
-    stages: Sequence[StageFit],
+    fit: Optimum | None,
     predicted: Sequence[RunQuality],
     *,
-    planned: Sequence[str] = (),
     required: float = REQUIRED,
     of_fit: Verdict | None = None,
     posterior: Posterior | None = None,
@@ -323,12 +322,10 @@ def assess_fit(
 
     Parameters
     ----------
-    stages : sequence of StageFit
-        Each stage of the fit; none for a drive that is only compared with runs.
+    fit : Optimum or None
+        None for a drive that is only compared with runs.
     predicted : sequence of RunQuality
         Of runs that were held out of the fit, as `validation.predict` gives them.
-    planned : sequence of str
-        Names of all stages of the fit setup, to tell those that were never begun.
     required : float
         Largest error of a prediction in a new maneuver, over the range of the signal. [1]
     of_fit : Verdict, optional
@@ -339,29 +336,24 @@ def assess_fit(
     """
     expected = () if of_fit is None else of_fit.predictions
     commands = None if of_fit is None else of_fit.commands
-    unsound = tuple(unsound_data(stages, predicted, expected, commands))
+    unsound = tuple(unsound_data(fit, predicted, expected, commands))
     named = {str(finding.run) for finding in unsound}
     held_out = {quality.experiment.name for quality in predicted}
-    tested = {run.name: run for run in _fitted_runs(stages)}
+    tested = {run.name: run for run in (fit.problem.experiments if fit else ())}
     tested |= {quality.experiment.name: quality.experiment for quality in predicted}
     motions = defaultdict[str, list[LeftOpen]](list)
-    if posterior is not None:
+    if fit is not None and posterior is not None:
         fastest = _fastest_sine(tested)
-        for motion, channel, record in motions_left_open(stages, posterior, fastest):
+        for motion, channel, record in motions_left_open(fit, posterior, fastest):
             motions[channel].append(LeftOpen(record, motion.faster))
-    predictions = prediction_errors(stages, predicted, named & held_out, motions)
-    decisive = _decisive(predictions, stages, predicted)
-    if not stages:
+    predictions = prediction_errors(fit, predicted, named & held_out, motions)
+    decisive = _decisive(predictions, fit, predicted)
+    if fit is None:
         return Verdict(required, predictions, decisive, fitted=False, unsound=unsound)
-    unfinished = tuple(_unfinished(stages, planned))
-    lost = {name for stage in stages for name in weak_unknowns(stage)}
-    machine = [
-        unknown.name
-        for stage in stages
-        for unknown in stage.problem.unknowns
-        if unknown.run is None
-    ]
-    causes = None if unfinished or unsound else causes_of(stages)
+    unfinished = tuple(_unfinished(fit.solution))
+    lost = set(weak_unknowns(fit))
+    machine = [unknown.name for unknown in fit.problem.unknowns if unknown.run is None]
+    causes = None if unfinished or unsound else causes_of(fit)
     return Verdict(
         required,
         predictions,
@@ -371,23 +363,13 @@ def assess_fit(
         quotable=sum(name not in lost for name in machine),
         undetermined=tuple(name for name in machine if name in lost),
         causes=causes,
-        validity=_validity(stages, tested),
+        validity=_validity(fit, tested),
         fastest_sine=_fastest_sine(tested),
-        commands=commands_of(_fitted_runs(stages)),
-        judged=judged_runs(stages, predicted),
-        assumed=tuple(_assumed(stages)),
-        remarks=tuple(_starts(stages)),
+        commands=commands_of(fit.problem.experiments),
+        judged=judged_runs(fit, predicted),
+        assumed=tuple(_assumed(fit)),
+        remarks=tuple(_starts(fit.starts)),
     )
-
-
-def starts_of(stages: Sequence[StageFit]) -> dict[str, Sequence[Solution]]:
-    """Starts by stage, of the stages that had several."""
-    return {stage.stage.name: stage.starts for stage in stages if len(stage.starts) > 1}
-
-
-def _fitted_runs(stages: Sequence[StageFit]) -> list[Experiment]:
-    """The fitted runs of all stages, each once."""
-    return list({e.name: e for a in stages for e in a.problem.experiments}.values())
 
 
 # --- what decides ---------------------------------------------------------------------------------
@@ -395,13 +377,14 @@ def _fitted_runs(stages: Sequence[StageFit]) -> list[Experiment]:
 
 def _decisive(
     predictions: Sequence[PredictionError],
-    stages: Sequence[StageFit],
+    fit: Optimum | None,
     predicted: Sequence[RunQuality],
 ) -> tuple[str, ...]:
     """Channels that decide: of those that measure a drive's shaft the best, then all others."""
-    runs = [*_fitted_runs(stages), *(quality.experiment for quality in predicted)]
+    fitted = fit.problem.experiments if fit else ()
+    runs = [*fitted, *(quality.experiment for quality in predicted)]
     kinds = {name: channel.kind for run in runs for name, channel in run.channels.items()}
-    drive = all(isinstance(stage.problem.model, DriveModel) for stage in stages)
+    drive = fit is None or isinstance(fit.problem.model, DriveModel)
     shaft = [
         prediction
         for prediction in predictions
@@ -414,18 +397,12 @@ def _decisive(
     return (best.channel, *others)
 
 
-def _unfinished(stages: Sequence[StageFit], planned: Sequence[str]) -> Iterator[str]:
-    """Clauses on stages that did not come to their end."""
-    for stage in stages:
-        name, solution = stage.stage.name, stage.solution
-        if solution.interrupted:
-            yield f"stage {name} was interrupted, and its best so far is not an optimum"
-        elif not solution.converged:
-            yield f"stage {name} did not converge ({solution.message})"
-    done = {stage.stage.name for stage in stages}
-    missing = [name for name in planned if name not in done]
-    if missing:
-        yield f"{listed(missing)} {'were' if len(missing) > 1 else 'was'} never fitted"
+def _unfinished(solution: Solution) -> Iterator[str]:
+    """Clause on a search that did not come to its end."""
+    if solution.interrupted:
+        yield "the search was interrupted, and its best so far is not an optimum"
+    elif not solution.converged:
+        yield f"the search did not converge ({solution.message})"
 
 
 # --- words ----------------------------------------------------------------------------------------
@@ -438,26 +415,24 @@ def _state(stated: ClassError, required: float) -> str:
     return "met" if stated.error <= required else "NOT MET"
 
 
-def _starts(stages: Sequence[StageFit]) -> Iterator[str]:
-    """How many starts reached the best optimum."""
-    for stage, results in starts_of(stages).items():
-        costs = [solution.cost for solution in results]
-        best = min(costs)
-        if isinf(best):
-            yield f"{stage}: no start ended with a finite cost."
-            continue
-        alike = sum(cost <= best * (1.0 + SAME) for cost in costs)
-        yield f"{stage}: {alike} of {len(costs)} starts reached the best cost, {best:.6g}."
+def _starts(starts: Sequence[Solution]) -> Iterator[str]:
+    """How many starts reached the best optimum, if there were several."""
+    if len(starts) < 2:
+        return
+    costs = [solution.cost for solution in starts]
+    best = min(costs)
+    if isinf(best):
+        yield "No start ended with a finite cost."
+        return
+    alike = sum(cost <= best * (1.0 + SAME) for cost in costs)
+    yield f"{alike} of {len(costs)} starts reached the best cost, {best:.6g}."
 
 
-def _assumed(stages: Sequence[StageFit]) -> Iterator[str]:
+def _assumed(fit: Optimum) -> Iterator[str]:
     """Phrases on what a fit cannot check: the channels' scales and the fixed parameters."""
     channels = dict[str, Channel]()
-    for stage in stages:
-        for run in stage.problem.experiments:
-            for name in stage.problem.channels:
-                if name in run.channels:
-                    channels[name] = run[name]
+    for run in fit.problem.experiments:
+        channels |= {name: run[name] for name in fit.problem.channels if name in run.channels}
     for name, channel in channels.items():
         if channel.encoder is not None:
             yield f"the scale of {name}, {channel.encoder.counts_per_turn:.6g} counts per turn"
@@ -465,14 +440,11 @@ def _assumed(stages: Sequence[StageFit]) -> Iterator[str]:
             yield f"the scale of {name} within {percent(channel.instrument.gain)}"
         else:
             yield f"the scale of {name}"
-    fixed = [name for stage in stages for name in fixed_numbers(stage)]
+    fixed = fixed_numbers(fit)
     symbols = list(dict.fromkeys(COLUMNS[name] for name in fixed))
     if not symbols:
         return
-    with_uncertainty = set[str]()
-    for stage in stages:
-        for deviations in stage.problem.uncertain:
-            with_uncertainty.update(deviations)
+    with_uncertainty = {name for together in fit.problem.uncertain for name in together}
     uncertain_symbols = list(
         dict.fromkeys(COLUMNS[name] for name in fixed if name in with_uncertainty)
     )
@@ -504,15 +476,14 @@ def _fastest_sine(tested: Mapping[str, Experiment]) -> float:
     return max((maneuver.frequency or 0.0 for maneuver in recognised), default=0.0)
 
 
-def _validity(stages: Sequence[StageFit], tested: Mapping[str, Experiment]) -> str:
+def _validity(fit: Optimum, tested: Mapping[str, Experiment]) -> str:
     """Sentence on the maneuvers that the fit holds for, and on limits never reached or modelled."""
     sentence = f"Holds for {maneuvers_tested(tested)}"
-    stage = stages[-1]
-    if not isinstance(stage.problem.model, DriveModel):
+    if not isinstance(fit.problem.model, DriveModel):
         return f"{sentence}."
     try:
-        runs = _fitted_runs(stages)
-        parameters = stage.drive.parameters
+        runs = fit.problem.experiments
+        parameters = fit.drive.parameters
         reached = {limit for run in runs for limit in limits_reached(run, parameters)}
     except (DomainError, InputError):
         return f"{sentence}."

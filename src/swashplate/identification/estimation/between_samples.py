@@ -16,11 +16,11 @@ import numpy as np
 
 from swashplate.campaign import Between, Experiment
 from swashplate.errors import DomainError
+from swashplate.identification.estimation.fit_problem import Parameters, problem_of
 from swashplate.identification.estimation.model import EquationModel
 from swashplate.identification.estimation.problem import Loss
 from swashplate.identification.estimation.setup import FitSetup
 from swashplate.identification.estimation.solving import approached, solve
-from swashplate.identification.estimation.stages import Parameters, stage_problem
 
 WORDS: Mapping[Between, str] = {
     "linear": "a straight line between samples",
@@ -50,11 +50,11 @@ class Settled(NamedTuple):
     sentences: tuple[str, ...] = ()
     """On what was taken."""
     near: Mapping[str, float] = MappingProxyType({})
-    """Values near the optimum of the first stage, by the unknowns' labels; none if unknown."""
+    """Values near the optimum, by the unknowns' labels; none if unknown."""
 
 
 class _Way(NamedTuple):
-    """The first stage, fitted in one way."""
+    """The fit in one way."""
 
     cost: float
     near: Mapping[str, float]
@@ -71,7 +71,7 @@ def settle(
 ) -> Settled:
     """Runs with what their input is between samples settled.
 
-    The first stage is fitted each way, and the one that leaves the smallest residuals is taken. A
+    The fit is made each way, and the one that leaves the smallest residuals is taken. A
     model that its own code simulates is not tried, as each evaluation may take minutes: its input
     is a straight line unless stated, and the sentence says so. What the campaign states is not
     tried either, see `doubt`.
@@ -129,20 +129,19 @@ def _ways(
     loss: Loss,
     threads: int | None,
 ) -> dict[Between, _Way] | None:
-    """The first stage each way, straight lines first; None if a model is not tried.
+    """The fit each way, straight lines first; None if a model is not tried.
 
     Each way begins where the one before ended.
     """
     ways = dict[Between, _Way]()
     near = dict[str, float]()
-    first = setup.stages[0]
     sudden = any(run.input.jumps.size for run in runs)
     for between in WORDS if sudden else ("linear", "previous"):
-        problem = stage_problem(first, nominal, joined(runs, between), threads=threads)
+        problem = problem_of(setup, nominal, joined(runs, between), threads=threads)
         if not isinstance(problem.model, EquationModel):
             return None
         try:
-            if first.has_spreads and not near:
+            if setup.has_spreads and not near:
                 near = problem.unknowns.values(approached(problem, loss=loss))
             # one way has instants of jumps among its unknowns, another has none
             start = problem.unknowns.vector_of(near)
@@ -151,7 +150,7 @@ def _ways(
             return None  # the fit itself says where the model does not hold
         values = problem.unknowns.values(solution.vector)
         ways[between] = _Way(solution.cost, values)
-        if first.has_spreads:
+        if setup.has_spreads:
             near = values
     return ways
 

@@ -58,10 +58,6 @@ from swashplate.results import Result
 Array = NDArray[np.float64]
 DrivePart = Literal["card", "pump", "chain"]
 """What of the drive is simulated: the card alone, pump and motor over a current, or all."""
-Starts = Mapping[str, Mapping[str, float]]
-"""For some experiments by name the currents at the first sample, as `START_CURRENTS` has them."""
-Instants = Mapping[tuple[str, str], Prior]
-"""What an earlier stage found of the instants of edges, by run and name."""
 
 START_PRESSURE = "start_pressure"
 """Name of δP at the first sample, where it is an unknown of the experiment."""
@@ -179,23 +175,16 @@ def measured_current(experiment: Experiment, scale: float = 1.0) -> Record:
     return _gridded(current)
 
 
-def simulated_current(
-    experiment: Experiment,
-    parameters: ParameterSet,
-    start: Mapping[str, float] = MappingProxyType({}),
-) -> Record:
+def simulated_current(experiment: Experiment, parameters: ParameterSet) -> Record:
     """The signed current that a card makes of an experiment's command, on the march's grid. [A]
 
-    `start` are currents at the first sample that were estimated, by `START_CURRENTS`; without, the
-    card begins at rest or settled, as the experiment does.
+    The card begins at rest or settled, as the experiment does.
     """
     record = voltage_record(experiment)
     observation = Observation("current", record.points, np.zeros(record.values.size))
     observed = ObservedRecord(record, (observation,), "voltage", experiment.begins)
     # refinements begin downstream of the card
-    ready = DriveModel(parameters.plain, "card").ready(
-        start, experiment, SimulationRequest(observed)
-    )
+    ready = DriveModel(parameters.plain, "card").ready({}, experiment, SimulationRequest(observed))
     return replace(record, values=ready.residuals(observed))
 
 
@@ -323,8 +312,6 @@ class DriveModel(Result, EquationModel):
     """For the pump alone, signed currents by the experiments' names, if not as measured. [A]"""
     forces: Forces | None = None
     """The forces that stand for the solenoids' coefficients."""
-    starts: Starts = field(default_factory=dict)
-    """Currents at the first sample of simulated currents, see `simulated_current`."""
 
     def signals_of(self, experiment: Experiment) -> Mapping[str, str]:
         """Signal for each channel that this part of the drive gives."""
@@ -344,9 +331,7 @@ class DriveModel(Result, EquationModel):
             return "voltage", voltage_record(with_instants), {}
         given = self.currents.get(experiment.name)
         if with_instants is not experiment:
-            given = simulated_current(
-                with_instants, self.parameters, self.starts.get(with_instants.name, {})
-            )
+            given = simulated_current(with_instants, self.parameters)
         return "current", measured_current(experiment) if given is None else given, {}
 
     def _part_of(self, experiment: Experiment) -> DrivePart:
@@ -432,13 +417,13 @@ def _instants_of(command: InputSignal) -> dict[str, CommandJump]:
     return {f"edge at {edge.middle:.6g} s": edge for edge in command.edges}
 
 
-def unknown_instants(run: Experiment, earlier_instants: Instants) -> list[Unknown]:
-    """Instants of a voltage's edges, anywhere between two samples or as an earlier stage found."""
+def unknown_instants(run: Experiment) -> list[Unknown]:
+    """Instants of a voltage's edges, each anywhere between two samples."""
     unknowns = list[Unknown]()
     edges = _instants_of(run.input) if run.input.kind == "voltage" else {}
     for name, edge in edges.items():
         most = 0.5 * (edge.interval + JUMP_TIME)
-        prior = earlier_instants.get((run.name, name), Prior(0.0, edge.interval / sqrt(12.0)))
+        prior = Prior(0.0, edge.interval / sqrt(12.0))
         unknown = Unknown(
             name,
             prior.mean,
@@ -461,7 +446,7 @@ def edges_problem(parameters: ParameterSet, run: Experiment) -> Problem | None:
     that is wrong says little of them. None where there are no edges, or too many, or no
     channel of a drive.
     """
-    model, edges = DriveModel(parameters), unknown_instants(run, {})
+    model, edges = DriveModel(parameters), unknown_instants(run)
     if not 0 < len(edges) <= MOST_EDGES or not model.signals_of(run):
         return None
     scales, zeros = dict[str, float](), list[Unknown]()

@@ -31,7 +31,6 @@ from swashplate.identification.estimation.problem import Problem, noise_scales
 from swashplate.identification.estimation.setup import (
     FitSetup,
     Free,
-    Stage,
     StandardUncertainty,
     deviation,
 )
@@ -155,15 +154,14 @@ class ModelSetup(Result):
 
     @property
     def setup(self) -> FitSetup:
-        """The fit setup as that of a fit in stages, of which it has one."""
+        """What is free, in the form of a fit setup."""
         free = {
             unknown.name: Free(
                 bounds=(unknown.low, unknown.high), log=unknown.log, prior=unknown.prior
             )
             for unknown in self.free.values()
         }
-        stage = Stage(name=self.name, part="model", free=free)
-        content = {"title": self.name, "stages": (stage,)}
+        content = {"title": self.name, "part": "model", "free": free}
         uncertain = {"standard_uncertainty": dict(self.standard_uncertainty)}
         return validated(content | uncertain, FitSetup, self.name)
 

@@ -1,15 +1,14 @@
-"""Fit setup: what a fit is to find, in one stage or several.
+"""Fit setup: what a fit is to find, and which part of the machine is simulated for it.
 
-A drive's is written in TOML or packaged, and goes with the numbers of a `ParameterSet`. Of a
-user-defined model a `model_setup.ModelSetup` is both, the numbers and what is to be found: its
-`setup` is a fit setup of one stage, so that all that comes after sees the same two things.
+A drive's is written in TOML, and goes with the numbers of a `ParameterSet`. Of a user-defined model
+a `model_setup.ModelSetup` is both, the numbers and what is to be found; its `setup` is the same, so
+that all that comes after sees the same two things.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from functools import cache
-from importlib.resources import files
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, Literal
 
@@ -20,16 +19,12 @@ from pydantic import AfterValidator, Field, model_validator
 from swashplate.campaign import LARGEST_PRESSURE, ChannelKind, TimeWindow, WeightWindow
 from swashplate.documents import parse_toml, read_text, validated
 from swashplate.entries import SCHEMA, Document, FileTable, Finite, Flag, NotNegative, Positive
-from swashplate.errors import (
-    ParameterError,
-    meant,
-)
+from swashplate.errors import ParameterError
 from swashplate.identification.estimation.unknowns import Prior, Unknown
 from swashplate.machine.fields import is_real
 from swashplate.parameters import SIDES, Definitions, ParameterSet
 
 Array = NDArray[np.float64]
-_SETUPS = files("swashplate.identification").joinpath("setups")
 Pair = tuple[Finite, Finite]
 StandardUncertainty = Positive | Annotated[str, Field(pattern=r"^\d+(\.\d+)? ?%$")]
 """A standard uncertainty: in SI units, or as "5 %" of the value."""
@@ -172,17 +167,18 @@ class InputWeight(TimeWindow):
         return self
 
 
-class Stage(FileTable):
-    """One fit: a part of the drive against its channels."""
+class FitSetup(Document):
+    """A fit: what of a drive is simulated, against which channels, and what is free of it."""
 
-    name: str
+    title: str = ""
     part: Literal["card", "pump", "chain", "model"] = Field(
+        "chain",
         description="Simulated part: the control card, pump and motor, the complete chain; 'model' "
-        "is for user-defined models, given by --model."
+        "is for user-defined models, given by --model.",
     )
     current: Literal["simulated", "measured"] = Field(
         "simulated",
-        description="Current that drives the pump alone: that of the fitted card, or the "
+        description="Current that drives the pump alone: that of the drive's own card, or the "
         "measured one: the input if it is a current, otherwise the channel of the current, an "
         "ammeter around both leads with the command's sign.",
     )
@@ -209,46 +205,6 @@ class Stage(FileTable):
         description="Largest stroking pressure at the first sample, free in each run [Pa]; if "
         "none is given, it is free only in runs with start = 'estimated'.",
     )
-
-    @model_validator(mode="after")
-    def _consistent(self) -> Stage:
-        if self.current_scale != 1.0 and (self.part, self.current) != ("pump", "measured"):
-            raise ValueError("current_scale needs part = 'pump' and current = 'measured'")
-        if self.start_pressure is not None and self.part == "card":
-            raise ValueError("a card alone has no start_pressure")
-        return self
-
-    @property
-    def has_spreads(self) -> bool:
-        """Whether something is known of each number beforehand: see `stages.whole_drive`."""
-        entries = self.free.values()
-        known = all(entry.spread or entry.prior for entry in entries)
-        return self.forces is None and known and any(entry.spread for entry in entries)
-
-    def beyond(self, unknown: Unknown, side: int, definitions: Definitions) -> str:
-        """What to do about an unknown of the machine at its lower (-1) or upper (1) bound.
-
-        `definitions` are those of the drive's parameters.
-        """
-        name = unknown.name
-        if self.part == "model":
-            return f"to extend the search, widen '{name}' in free of the model and fit again"
-        if self.forces is not None and name in self.forces.names:
-            where = "relative under [stages.forces]"
-        else:
-            limits = definitions.find(name)
-            least = limits.lower if limits.least is None else limits.least
-            if unknown.high >= limits.upper if side > 0 else unknown.low <= least:
-                return f"the {'greatest' if side > 0 else 'least'} value that it may have"
-            where = f"{name if name in self.free else _symbol(name)} under [stages.free]"
-        return f"to extend the search, widen {where} of the stage '{self.name}' and fit again"
-
-
-class FitSetup(Document):
-    """A fit in one stage or several, each starting from what the ones before found."""
-
-    title: str = ""
-    stages: tuple[Stage, ...] = Field(min_length=1)
     standard_uncertainty: dict[str, StandardUncertainty] = Field(
         {},
         description="Standard uncertainty of fixed parameters, in SI units or as '5 %' of "
@@ -262,41 +218,62 @@ class FitSetup(Document):
         "or the recursion, to which published zeta and omega belong.",
     )
 
+    @model_validator(mode="before")
+    @classmethod
+    def _of_one_stage(cls, content: Any) -> Any:
+        """Take what earlier versions wrote: a setup of one stage stood in [[stages]]."""
+        if not isinstance(content, Mapping) or "stages" not in content:
+            return content
+        stages = content["stages"]
+        if not isinstance(stages, Sequence) or len(stages) != 1:
+            raise ValueError(
+                "a fit has no stages any more: write each into a file of its own, without "
+                "[[stages]], and fit them one after another, each --from the folder of the one "
+                "before; or leave out --setup, and all numbers are fitted at once"
+            )
+        others = {key: value for key, value in content.items() if key != "stages"}
+        return others | {key: value for key, value in stages[0].items() if key != "name"}
+
     @model_validator(mode="after")
-    def _fixed(self) -> FitSetup:
+    def _consistent(self) -> FitSetup:
+        if self.current_scale != 1.0 and (self.part, self.current) != ("pump", "measured"):
+            raise ValueError("current_scale needs part = 'pump' and current = 'measured'")
+        if self.start_pressure is not None and self.part == "card":
+            raise ValueError("a card alone has no start_pressure")
         for name in self.standard_uncertainty:
             symbol = _symbol(name)
-            for stage in self.stages:
-                free = any(
-                    entry in (name, symbol) or _symbol(entry) == name for entry in stage.free
+            free = any(entry in (name, symbol) or _symbol(entry) == name for entry in self.free)
+            if free or (self.forces is not None and symbol in COEFFICIENTS):
+                raise ValueError(
+                    f"{name} is free: only what stays fixed has a standard_uncertainty; for a "
+                    "free parameter state a prior"
                 )
-                if free or (stage.forces is not None and symbol in COEFFICIENTS):
-                    raise ValueError(
-                        f"{name} is free in the stage '{stage.name}': only what stays fixed has a "
-                        "standard_uncertainty; for a free parameter state a prior"
-                    )
         return self
 
-    def joint(self) -> FitSetup:
-        """The same unknowns, all at once through the whole chain.
+    @property
+    def has_spreads(self) -> bool:
+        """Whether something is known of each number beforehand: see `problems.whole_drive`."""
+        entries = self.free.values()
+        known = all(entry.spread or entry.prior for entry in entries)
+        return self.forces is None and known and any(entry.spread for entry in entries)
 
-        A `ParameterError` says that two stages free the same parameter, or that one is driven by a
-        scaled current, which no chain makes.
+    def beyond(self, unknown: Unknown, side: int, definitions: Definitions) -> str:
+        """What to do about an unknown of the machine at its lower (-1) or upper (1) bound.
+
+        `definitions` are those of the drive's parameters.
         """
-        merged: dict[str, Any] = {"free": {}, "weights": {}, "weights_by_input": {}}
-        for stage in self.stages:
-            if stage.current_scale != 1.0:
-                raise ParameterError(
-                    f"The stage '{stage.name}' is driven by {stage.current_scale:g} times the "
-                    "measured current, so a joint fit through the card cannot replace it."
-                )
-            if twice := sorted(set(merged["free"]) & set(stage.free)):
-                raise ParameterError(f"{twice[0]} is free in two stages; a joint fit needs one.")
-            merged = {key: merged[key] | getattr(stage, key) for key in merged}
-        forces = next((stage.forces for stage in self.stages if stage.forces is not None), None)
-        most = max((stage.start_pressure or 0.0 for stage in self.stages), default=0.0) or None
-        stage = Stage(name="chain", part="chain", forces=forces, start_pressure=most, **merged)
-        return self.model_copy(update={"stages": (stage,)})
+        name = unknown.name
+        if self.part == "model":
+            return f"to extend the search, widen '{name}' in free of the model and fit again"
+        if self.forces is not None and name in self.forces.names:
+            where = "relative under [forces]"
+        else:
+            limits = definitions.find(name)
+            least = limits.lower if limits.least is None else limits.least
+            if unknown.high >= limits.upper if side > 0 else unknown.low <= least:
+                return f"the {'greatest' if side > 0 else 'least'} value that it may have"
+            where = f"{name if name in self.free else _symbol(name)} under [free]"
+        return f"to extend the search, widen {where} of the fit setup and fit again"
 
 
 def _symbol(name: str) -> str:
@@ -310,44 +287,36 @@ def deviation(uncertainty: float | str, value: float) -> float:
     return float(uncertainty)
 
 
-def setup_names() -> tuple[str, ...]:
-    """Names of the packaged fit setups."""
-    names = (file.name for file in _SETUPS.iterdir())
-    return tuple(sorted(n.removesuffix(".toml") for n in names if n.endswith(".toml")))
-
-
-def load_setup(name: str | Path) -> FitSetup:
-    """A packaged fit setup by name, or a user-defined one from a TOML file.
+def load_setup(path: str | Path) -> FitSetup:
+    r"""A fit setup from a TOML file.
 
     Raises
     ------
     ParameterError
-        If there is none of that name, or an entry is wrong.
+        If an entry is wrong, or the name is not that of a .toml file.
     FileError
         If the file cannot be read.
 
     Examples
     --------
+    >>> from pathlib import Path
     >>> from swashplate.identification import load_setup
-    >>> [stage.name for stage in load_setup("hoist").stages]
-    ['card', 'pump']
+    >>> text = 'schema = 1\npart = "pump"\n[free]\nZ8 = { relative = [0.5, 2.0] }\n'
+    >>> _ = Path("pump.toml").write_text(text, "utf-8")
+    >>> load_setup("pump.toml").free["Z8"].relative
+    (0.5, 2.0)
     """
-    file = str(name)
-    if file.lower().endswith(".toml"):
-        text = read_text(name)
-    elif file in setup_names():
-        file = f"{name}.toml"
-        text = _SETUPS.joinpath(file).read_text("utf-8")
-    else:
+    file = str(path)
+    if not file.lower().endswith(".toml"):
         raise ParameterError(
-            f"There is no packaged fit setup '{name}'{meant(file, setup_names())}; there "
-            f"are {', '.join(setup_names())}, or give a .toml file."
+            f"'{file}' is no fit setup: give a .toml file with a table [free], or leave it out, "
+            "and every number of the named drive is fitted at once."
         )
-    return validated(parse_toml(text, file), FitSetup, file)
+    return validated(parse_toml(read_text(path), file), FitSetup, file)
 
 
 FreeParameters = FitSetup | str | Path | Mapping[str, Any]
-"""What a fit is to estimate: a fit setup, its packaged name or file, or a mapping."""
+"""What a fit is to estimate: a fit setup, its file, or a mapping."""
 
 
 def free_entries(free: Mapping[str, Any], definitions: Definitions) -> dict[str, Free]:
@@ -379,8 +348,7 @@ def setup_text(setup: FitSetup) -> str:
     from tomlkit import dumps, inline_table
 
     content = setup.model_dump(mode="json", by_alias=True, exclude_defaults=True)
-    for stage in content["stages"]:
-        for name, entry in stage["free"].items():
-            stage["free"][name] = inline_table()
-            stage["free"][name].update(entry)
+    for name, entry in content["free"].items():
+        content["free"][name] = inline_table()
+        content["free"][name].update(entry)
     return dumps({"schema": SCHEMA} | content)

@@ -20,7 +20,7 @@ from swashplate.identification.estimation.problem import (
     rounded_unknowns,
 )
 from swashplate.identification.estimation.unknowns import Unknown, Unknowns
-from swashplate.identification.stage_fit import StageFit, once_per_stage
+from swashplate.identification.optimum import Optimum, once_per_fit
 from swashplate.identification.statistics.intervals import estimates_of, uncertainty_of
 from swashplate.models.displacement_control import FORCE, MOTION, PRESSURE, TRAVEL, ZERO
 from swashplate.parameters import CATALOGUE, DEFINITIONS, ParameterSet
@@ -453,17 +453,17 @@ def _fixing(candidates: list[int], vector: Array, null: Array, fixed: list[int])
     return None
 
 
-# --- of a stage -----------------------------------------------------------------------------------
+# --- of a fit -------------------------------------------------------------------------------------
 
 
-@once_per_stage
-def identifiability_of(stage: StageFit) -> Identifiability:
-    """Which unknowns of a stage the tests determine."""
-    linearised = stage.linearised
-    names = stage.problem.unknowns.names
-    fixed = {name: value for name, value in stage.parameters.numbers.items() if name not in names}
+@once_per_fit
+def identifiability_of(fit: Optimum) -> Identifiability:
+    """Which unknowns of a fit the tests determine."""
+    linearised = fit.linearised
+    names = fit.problem.unknowns.names
+    fixed = {name: value for name, value in fit.parameters.numbers.items() if name not in names}
     try:
-        quoted = uncertainty_of(stage).quoted.matrix
+        quoted = uncertainty_of(fit).quoted.matrix
     except InputError:  # too few samples to tell the noise from
         quoted = None
     return identifiability(
@@ -472,35 +472,35 @@ def identifiability_of(stage: StageFit) -> Identifiability:
         covariance=quoted,
         tolerance=linearised.tolerance,
         fixed=fixed,
-        rounded=rounded_unknowns(stage.problem, stage.solution.vector),
+        rounded=rounded_unknowns(fit.problem, fit.solution.vector),
     )
 
 
-def bounds_reached(stage: StageFit) -> tuple[str, ...]:
+def bounds_reached(fit: Optimum) -> tuple[str, ...]:
     """Sentences on unknowns of the machine that ended at a bound, and what to do about it."""
-    point = stage.problem.unknowns.at(stage.solution.vector)
+    point = fit.problem.unknowns.at(fit.solution.vector)
     ends = {-1: "lower", 1: "upper"}
     definitions = DEFINITIONS
-    if isinstance(stage.parameters, ParameterSet):
-        definitions = stage.parameters.definitions
+    if isinstance(fit.parameters, ParameterSet):
+        definitions = fit.parameters.definitions
     return tuple(
         f"{unknown.name} ended at its {ends[side]} bound: "
-        f"{stage.stage.beyond(unknown, side, definitions)}."
+        f"{fit.setup.beyond(unknown, side, definitions)}."
         for unknown, side in zip(point, point.at_bound.tolist(), strict=True)
         if unknown.run is None and side
     )
 
 
-def without_value(stage: StageFit) -> list[str]:
+def without_value(fit: Optimum) -> list[str]:
     """Unknowns of the machine that ended at a bound, or that the tests do not determine."""
-    judged = identifiability_of(stage)
+    judged = identifiability_of(fit)
     lost = {*judged.at_bounds, *judged.to_fix}
-    machine = (unknown.name for unknown in stage.problem.unknowns if unknown.run is None)
+    machine = (unknown.name for unknown in fit.problem.unknowns if unknown.run is None)
     return [name for name in machine if name in lost]
 
 
-def weak_unknowns(stage: StageFit) -> list[str]:
+def weak_unknowns(fit: Optimum) -> list[str]:
     """Unknowns of the machine with an interval wider than 10 % of the value, or without one."""
-    pairs = zip(estimates_of(stage), stage.problem.unknowns, strict=True)
+    pairs = zip(estimates_of(fit), fit.problem.unknowns, strict=True)
     machine = [estimate for estimate, unknown in pairs if unknown.run is None]
     return [estimate.name for estimate in machine if estimate.relative_half_width > WIDE]

@@ -1,4 +1,4 @@
-"""What estimates depend on besides noise: earlier stages, fixed numbers, instruments, runs.
+"""What estimates depend on besides noise: fixed numbers, instruments, runs that differ.
 
 Estimates absorb such an effect, so that residuals do not show it. How far they move is linear in
 it: a standard uncertainty of each effect, times this slope, goes into the intervals (JCGM 100:2008,
@@ -25,7 +25,7 @@ from swashplate.identification.estimation.drive_model import (
 from swashplate.identification.estimation.model import MachineModel, simulated
 from swashplate.identification.estimation.model import linearised as linearised_model
 from swashplate.identification.estimation.problem import LinearisedFit, LinearisedRun
-from swashplate.identification.stage_fit import StageFit
+from swashplate.identification.optimum import Optimum
 from swashplate.results import Result
 
 Array = NDArray[np.float64]
@@ -43,65 +43,34 @@ FEWEST_RUNS = 5
 """Runs from which it is estimated by how much they differ."""
 
 
-# --- models and earlier stages --------------------------------------------------------------------
+# --- models and fixed numbers ---------------------------------------------------------------------
 
 
-def follows_card(stage: StageFit, earlier: StageFit) -> bool:
-    """Whether a stage takes the current from the card that an earlier one estimated.
-
-    Not if its current is measured, or if it frees the card itself.
-    """
-    model, voltage = stage.problem.model, [e.input.kind for e in stage.problem.experiments]
-    driven = stage.stage.current == "simulated" and "voltage" in voltage
-    pump = isinstance(model, DriveModel) and model.part == "pump"
-    return pump and driven and earlier.stage.part == "card"
-
-
-def source_of(stage: StageFit) -> Callable[[Experiment], MachineModel]:
-    """The model of a run of a stage: the whole chain if the fitted card drives the pump."""
-    model = stage.problem.model
+def source_of(fit: Optimum) -> Callable[[Experiment], MachineModel]:
+    """The model of a run: the whole chain if the drive's own card drives the pump."""
+    model = fit.problem.model
     if not isinstance(model, DriveModel):
         return lambda experiment: model
     part_model, chain = (
-        replace(model, parameters=stage.drive.parameters, part=part)
-        for part in (model.part, "chain")
+        replace(model, parameters=fit.drive.parameters, part=part) for part in (model.part, "chain")
     )
-    by_card = model.part == "pump" and stage.stage.current == "simulated"
+    by_card = model.part == "pump" and fit.setup.current == "simulated"
     return lambda run: chain if by_card and run.input.kind == "voltage" else part_model
 
 
-def slopes_by_earlier(stage: StageFit, earlier: StageFit) -> Array:
-    """(K, K_earlier) derivatives of a pump's estimates by those of the card that drives it.
-
-    Notes
-    -----
-    The later estimate makes J₂ᵀ r₂ = 0, so to first order dθ₂/dθ₁ = -(J₂ᵀJ₂)⁻¹ J₂ᵀ ∂r₂/∂θ₁: the
-    second step of a two-step estimate (Murphy and Topel 1985). Gauss-Newton's approximation, as
-    everywhere here: second derivatives times residuals are left out.
-    """
-    unknowns, vector = earlier.problem.unknowns, earlier.solution.vector
-    names = unknowns.machine_targets
-    slopes = np.zeros((len(stage.linearised.variables), len(unknowns)))
-    slopes[:, unknowns.shared] = _slopes_by_names(stage, names, unknowns.chain(vector, names, ""))
-    return slopes
-
-
-def slopes_by(stage: StageFit, uncertain: Sequence[Mapping[str, float]]) -> Array:
-    """(K, F) changes of a stage's estimates if fixed numbers, by column, change together by these.
-
-    Without what follows from earlier stages.
-    """
+def slopes_by(fit: Optimum, uncertain: Sequence[Mapping[str, float]]) -> Array:
+    """(K, F) changes of the estimates if fixed numbers, by column, change together by these."""
     names = [name for together in uncertain for name in together]
     if not names:
-        return np.zeros((len(stage.linearised.variables), 0))
+        return np.zeros((len(fit.linearised.variables), 0))
     deviations = np.array([[change.get(name, 0.0) for change in uncertain] for name in names])
-    return _slopes_by_names(stage, names, deviations)
+    return _slopes_by_names(fit, names, deviations)
 
 
-def _slopes_by_names(stage: StageFit, names: Sequence[str], by: Array) -> Array:
-    """(K, F) derivatives of a stage's estimates, from those (names, F) of the model's numbers."""
-    problem, vector, linearised = stage.problem, stage.solution.vector, stage.linearised
-    products, source = np.zeros((linearised.rank, by.shape[1])), source_of(stage)
+def _slopes_by_names(fit: Optimum, names: Sequence[str], by: Array) -> Array:
+    """(K, F) derivatives of the estimates, from those (names, F) of the model's numbers."""
+    problem, vector, linearised = fit.problem, fit.solution.vector, fit.linearised
+    products, source = np.zeros((linearised.rank, by.shape[1])), source_of(fit)
     jacobians = linearised.jacobians()
     for number, experiment in enumerate(problem.experiments):
         values = problem.model_values(vector, number)
@@ -198,17 +167,17 @@ def after_play(values: Array, width: float) -> Array:
     return output
 
 
-def responses(stage: StageFit, number: int, resolution: float) -> Iterator[tuple[str, Changes]]:
-    """By what the residuals of one run of a stage would change, effect by effect.
+def responses(fit: Optimum, number: int, resolution: float) -> Iterator[tuple[str, Changes]]:
+    """By what the residuals of one run would change, effect by effect.
 
     Each is the change of (simulated less measured), by channel, for a standard uncertainty of the
     effect. `resolution` as of `changes_of`.
     """
-    experiment = stage.problem.experiments[number]
-    simulation = SimulatedRun(stage, number)
+    experiment = fit.problem.experiments[number]
+    simulation = SimulatedRun(fit, number)
     middle = simulation.of(experiment)
     for effect, changed, part in changes_of(experiment, resolution):
-        changed_signals = simulation.of(changed) if _acts(stage, experiment, changed) else middle
+        changed_signals = simulation.of(changed) if _acts(fit, experiment, changed) else middle
         yield (
             effect,
             {
@@ -222,12 +191,12 @@ def responses(stage: StageFit, number: int, resolution: float) -> Iterator[tuple
         yield "hysteresis of the current", late
 
 
-def _acts(stage: StageFit, experiment: Experiment, changed: Experiment) -> bool:
+def _acts(fit: Optimum, experiment: Experiment, changed: Experiment) -> bool:
     """Whether a change acts on what is simulated, and not only on what was measured."""
-    model = stage.problem.model
+    model = fit.problem.model
     if changed.input is not experiment.input or not isinstance(model, DriveModel):
         return True  # a user-defined model may take any channel as an input
-    if model.part == "pump" and stage.stage.current == "measured":
+    if model.part == "pump" and fit.setup.current == "measured":
         return True
     return any(
         changed[name].time is not channel.time for name, channel in experiment.channels.items()
@@ -235,38 +204,38 @@ def _acts(stage: StageFit, experiment: Experiment, changed: Experiment) -> bool:
 
 
 class SimulatedRun:
-    """One run of a stage with the numbers that were found, changed or not."""
+    """One run of a fit with the numbers that were found, changed or not."""
 
-    def __init__(self, stage: StageFit, number: int) -> None:
-        self.stage, self.source = stage, source_of(stage)
-        self.values = stage.problem.model_values(stage.solution.vector, number)
+    def __init__(self, fit: Optimum, number: int) -> None:
+        self.fit, self.source = fit, source_of(fit)
+        self.values = fit.problem.model_values(fit.solution.vector, number)
 
     def of(self, experiment: Experiment) -> Mapping[str, Array]:
-        """The samples of each channel that the stage's model has. [unit]"""
+        """The samples of each channel that the model has. [unit]"""
         model = self.source(experiment)
         if isinstance(model, DriveModel) and model.part == "pump":
-            current = measured_current(experiment, self.stage.stage.current_scale)
+            current = measured_current(experiment, self.fit.setup.current_scale)
             model = replace(model, currents={experiment.name: current})
         return simulated(model, self.values, experiment)
 
     def behind_hysteresis(self, experiment: Experiment) -> dict[str, Array]:
         """By how much these change if the current that drives the pump has a hysteresis.
 
-        Of a drive only; empty if the stage has no pump, the hysteresis is 0, or the drive has one
+        Of a drive only; empty if no pump is fitted, the hysteresis is 0, or the drive has one
         of its own.
         """
-        model, width = self.stage.problem.model, self.stage.stage.current_hysteresis
+        model, width = self.fit.problem.model, self.fit.setup.current_hysteresis
         if not isinstance(model, DriveModel) or model.part == "card" or width == 0.0:
             return {}
-        parameters = self.stage.drive.parameters
+        parameters = self.fit.drive.parameters
         if any(parameters.numbers.get(name) for name in HYSTERESIS):
             return {}
-        if self.stage.stage.current == "measured" or experiment.input.kind == "current":
-            current = measured_current(experiment, self.stage.stage.current_scale)
+        if self.fit.setup.current == "measured" or experiment.input.kind == "current":
+            current = measured_current(experiment, self.fit.setup.current_scale)
         else:
             current = simulated_current(experiment, parameters)
         late = replace(current, values=after_play(current.values, width))
-        pump = replace(model, parameters=parameters, part="pump", starts={})
+        pump = replace(model, parameters=parameters, part="pump")
         without_hysteresis, with_hysteresis = (
             simulated(replace(pump, currents={experiment.name: record}), self.values, experiment)
             for record in (current, late)
@@ -276,7 +245,7 @@ class SimulatedRun:
         }
 
 
-# --- all effects of a stage -----------------------------------------------------------------------
+# --- all effects ----------------------------------------------------------------------------------
 
 
 @dataclass(frozen=True, eq=False)
@@ -292,7 +261,7 @@ class RunToRun(Result):
 
 @dataclass(frozen=True, eq=False)
 class Effects(Result):
-    """What a stage's estimates depend on besides noise."""
+    """What estimates depend on besides noise."""
 
     systematic: Mapping[str, Array]
     """(K,) changes of the solver's vector for a standard uncertainty of each effect, by name."""
@@ -300,17 +269,17 @@ class Effects(Result):
     """None for fewer than `FEWEST_RUNS` runs with a motion, or runs that do not differ."""
 
 
-def effects_of(stage: StageFit) -> Effects:
+def effects_of(fit: Optimum) -> Effects:
     """Effects of the instruments, of what the model leaves out, and of runs that differ."""
-    linearised, problem = stage.linearised, stage.problem
+    linearised, problem = fit.linearised, fit.problem
     products, motions = dict[str, Array](), list[_Motion]()
     resolution = resolution_of_inputs([run.input for run in problem.experiments])
     jacobians = linearised.jacobians()
     for number in range(len(problem.experiments)):
-        run = RunParts(stage, number, jacobians)
-        for effect, changes in responses(stage, number, resolution):
+        run = RunParts(fit, number, jacobians)
+        for effect, changes in responses(fit, number, resolution):
             products[effect] = products.get(effect, 0.0) + run.along(changes)
-        if motion := motion_of(stage, number):
+        if motion := motion_of(fit, number):
             motions.append(run.motion(motion))
     systematic = {effect: -linearised.whitening @ product for effect, product in products.items()}
     return Effects(systematic, _run_to_run(linearised, motions))
@@ -331,13 +300,13 @@ class RunParts:
     """The channels of one run at the optimum that have a sample which counts."""
 
     def __init__(
-        self, stage: StageFit, number: int, jacobians: Iterator[tuple[LinearisedRun, Array]]
+        self, fit: Optimum, number: int, jacobians: Iterator[tuple[LinearisedRun, Array]]
     ) -> None:
-        self.rank, inverse = stage.linearised.rank, stage.linearised.inverse
-        self.directions, self.whitening = inverse.of_run(stage.problem.experiments[number].name)
+        self.rank, inverse = fit.linearised.rank, fit.linearised.inverse
+        self.directions, self.whitening = inverse.of_run(fit.problem.experiments[number].name)
         self.weights = {
             name: weight
-            for name, weight in stage.problem.weights[number].items()
+            for name, weight in fit.problem.weights[number].items()
             if (weight > 0.0).any()
         }
         self.parts = {name: next(jacobians) for name in self.weights}
@@ -366,10 +335,10 @@ class RunParts:
         return _Motion(square, product, self.along(changes))
 
 
-def motion_of(stage: StageFit, number: int) -> Changes:
+def motion_of(fit: Optimum, number: int) -> Changes:
     """What a run moves by, by channel: positions from their first sample on; no currents. [unit]"""
-    experiment = stage.problem.experiments[number]
-    samples = SimulatedRun(stage, number).of(experiment)
+    experiment = fit.problem.experiments[number]
+    samples = SimulatedRun(fit, number).of(experiment)
     motion = dict[str, Array]()
     for name, values in samples.items():
         channel = experiment[name]

@@ -22,6 +22,7 @@ from swashplate.drive import Drive
 from swashplate.errors import InputError
 from swashplate.identification.estimation.arrow import dense_factor, triangular_factor, whitening
 from swashplate.identification.estimation.drive_model import CURRENTS, DriveModel
+from swashplate.identification.estimation.fit_problem import problem_of
 from swashplate.identification.estimation.problem import (
     TOLERANCE,
     LinearisedFit,
@@ -30,8 +31,7 @@ from swashplate.identification.estimation.problem import (
     linearised_fit,
     noise_scales,
 )
-from swashplate.identification.estimation.setup import FitSetup, Stage
-from swashplate.identification.estimation.stages import stage_problem
+from swashplate.identification.estimation.setup import FitSetup
 from swashplate.identification.estimation.unknowns import Unknowns
 from swashplate.identification.noise import spectral_covariance
 from swashplate.identification.statistics.determination import Identifiability, identifiability
@@ -60,9 +60,8 @@ SINGLE_RUN_SHARE = 0.9
 
 @dataclass(frozen=True, eq=False)
 class RunInformation(Result):
-    """What the runs can tell of a stage's unknowns, at the nominal values: known before a fit."""
+    """What the runs can tell of the unknowns, at the nominal values: known before a fit."""
 
-    stage: Stage
     problem: Problem
     linearised: LinearisedFit
 
@@ -160,18 +159,16 @@ class RunInformation(Result):
         """What runs tell of each unknown, one letter a run; in a file their shares."""
         run_names = runs or [run.name for run in self.problem.experiments]
         columns = (
-            Column("stage", of="f"),
             Column("parameter"),
             Column("needs", wrap=True, of="tpf" if self._drive_model else ""),
             Column("effect", ".3g"),
             Column("runs"),
             *(Column(run, ".6g", of="f") for run in run_names),
         )
-        table = Table(f"Stage {self.stage.name}", columns)
+        table = Table("What the runs tell", columns)
         for name, shares in self.shares.items():
             shares_of_runs = [shares.get(run) for run in run_names]
             table.add(
-                self.stage.name,
                 name,
                 self.required_excitation(name),
                 self.effect(name),
@@ -182,7 +179,7 @@ class RunInformation(Result):
 
 
 def _letter(share: float | None) -> str:
-    """Letter of a run in a table: by its share, None for a run that the stage does not have."""
+    """Letter of a run in a table: by its share, None for a run that is not fitted."""
     if share is None:
         return "-"
     if share >= LARGE_SHARE:
@@ -191,15 +188,15 @@ def _letter(share: float | None) -> str:
 
 
 def run_information(
-    stage: Stage, nominal: ParameterSet | HasParameters, experiments: Sequence[Experiment]
+    setup: FitSetup, nominal: ParameterSet | HasParameters, experiments: Sequence[Experiment]
 ) -> RunInformation:
-    """What runs can tell of a stage's unknowns, before any fit.
+    """What runs can tell of the unknowns of a fit setup, before any fit.
 
     At the nominal values, best those that `smooth` makes, as a fit takes them. Raises
-    as `stages.stage_problem`, and a `DomainError` if the model does not hold there.
+    as `fit_problem.problem_of`, and a `DomainError` if the model does not hold there.
     """
-    problem = stage_problem(stage, set_of(nominal), experiments)
-    return RunInformation(stage, problem, linearised_fit(problem, problem.start))
+    problem = problem_of(setup, set_of(nominal), experiments)
+    return RunInformation(problem, linearised_fit(problem, problem.start))
 
 
 # --- what is known so far -------------------------------------------------------------------------
@@ -252,8 +249,8 @@ class PriorInformation(Result):
     """A drive, what is to be found of it, and what is known before the next test."""
 
     parameters: ParameterSet
-    stage: Stage
-    """All unknowns together."""
+    setup: FitSetup
+    """What is free."""
     variables: Unknowns
     """The machine's unknowns."""
     present: Array
@@ -265,7 +262,7 @@ class PriorInformation(Result):
         """A test with some sensors, by default those of the campaign; free zeros are spent."""
         rows = []
         for sensor in sensors or self.sensors:
-            problem = stage_problem(self.stage, self.parameters, [_imagined(maneuver, sensor)])
+            problem = problem_of(self.setup, self.parameters, [_imagined(maneuver, sensor)])
             # what is known beforehand counts once, not once a test
             data_alone = replace(
                 problem,
@@ -286,21 +283,16 @@ def prior_information(
 ) -> PriorInformation:
     """What is known of a drive before the next test.
 
-    The stages of `setup` are taken together, through the whole chain unless they all belong to one
-    part of it. If the drive is `fitted` to the tests made so far, noise and its colour are those of
+    If the drive is `fitted` to the tests made so far, noise and its colour are those of
     the residuals; else noise is as the campaign states it, correlated over `MEMORY`. Without
     tests, a fresh plan, the `sensors` count, by default `default_sensors`.
 
-    An `InputError` says that no sensor tells of the stage's part of the drive, or that a drive that
+    An `InputError` says that no sensor tells of the setup's part of the drive, or that a drive that
     is said to be fitted leaves residuals that are zero, or too large to be noise.
     """
-    (stage,) = setup.joint().stages
-    parts = {single.part for single in setup.stages}
-    if len(parts) == 1:
-        stage = stage.model_copy(update={"part": parts.pop()})
     if not experiments:
-        return _without_tests(parameters, stage, sensors or default_sensors(Drive(parameters)))
-    problem = stage_problem(stage, parameters, experiments)
+        return _without_tests(parameters, setup, sensors or default_sensors(Drive(parameters)))
+    problem = problem_of(setup, parameters, experiments)
     fit = linearised_fit(problem, problem.start) if fitted else None
     noises = noise_scales(problem.experiments, problem.channels)
     scales = {}
@@ -317,7 +309,7 @@ def prior_information(
         by_kind[sensor.kind] = sensor
     return PriorInformation(
         parameters=parameters,
-        stage=stage,
+        setup=setup,
         variables=machine_unknowns(problem),
         present=machine_rows(replace(problem, scales=scales)),
         sensors=tuple(by_kind.values()),
@@ -325,10 +317,10 @@ def prior_information(
 
 
 def _without_tests(
-    parameters: ParameterSet, stage: Stage, sensors: Sequence[Sensor]
+    parameters: ParameterSet, setup: FitSetup, sensors: Sequence[Sensor]
 ) -> PriorInformation:
-    """What only priors tell, and those of some sensors that the stage's part of a drive moves."""
-    part = stage.part
+    """What only priors tell, and those of some sensors that the setup's part of a drive moves."""
+    part = setup.part
     useful = [
         sensor
         for sensor in sensors
@@ -337,11 +329,11 @@ def _without_tests(
     if not useful:
         kinds = ", ".join(sensor.kind for sensor in sensors)
         raise InputError(f"A {part} shows nothing to {kinds}: name another sensor.")
-    problem = stage_problem(stage, parameters, [_imagined(step(1.0), useful[0])])
+    problem = problem_of(setup, parameters, [_imagined(step(1.0), useful[0])])
     _, prior = problem.unknowns.prior_rows(problem.start)
     return PriorInformation(
         parameters=parameters,
-        stage=stage,
+        setup=setup,
         variables=machine_unknowns(problem),
         present=prior[:, _machine(problem)],
         sensors=tuple(useful),

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
 from math import inf, log
@@ -27,18 +27,16 @@ from swashplate.identification.noise import (
     noise_colours,
     spectral_covariance,
 )
-from swashplate.identification.stage_fit import Interval, StageFit, Status, once_per_stage
+from swashplate.identification.optimum import Interval, Optimum, Status, once_per_fit
 from swashplate.identification.statistics.effects import (
     IN_RUN,
     RunToRun,
     effect_of_fixed,
     effects_of,
-    follows_card,
     slopes_by,
-    slopes_by_earlier,
 )
 from swashplate.identification.statistics.interval_ends import CheckedEnd, checked_ends
-from swashplate.results import Result, short
+from swashplate.results import Result
 from swashplate.tables import listed, percent
 
 Array = NDArray[np.float64]
@@ -216,46 +214,18 @@ def _interval(
 # --- what is taken for granted --------------------------------------------------------------------
 
 
-class EarlierStage(NamedTuple):
-    """An earlier stage's estimates as the later one takes them for granted."""
-
-    def __repr__(self) -> str:
-        return short(self)
-
-    covariance: Covariance
-    """Of the earlier stage's vector."""
-    slopes: Array
-    """(K, K_earlier) by how much the later stage's vector follows the earlier one's."""
-    stage: str = ""
-    """Name of the earlier stage."""
-
-
-def with_earlier_stages(
-    own: Covariance,
-    earlier_stages: Sequence[EarlierStage],
-    systematic: Systematic = MappingProxyType({}),
-) -> Covariance:
-    """A stage's covariance with what earlier stages do not know, and systematic effects.
+def with_effects(own: Covariance, systematic: Systematic) -> Covariance:
+    """A covariance with systematic effects.
 
     The degrees of freedom are Satterthwaite's, of the sum of the variances; a standard uncertainty
     that was stated has infinitely many (JCGM 100:2008, G.4).
     """
-    if not earlier_stages and not systematic:
+    if not systematic:
         return own
     both_determined = np.outer(own.determined, own.determined)
     columns = np.array(list(systematic.values())).reshape(-1, len(own.variables))
     total = own.matrix + np.where(both_determined, columns.T @ columns, 0.0)
     spread = np.diag(own.matrix) ** 2 / own.degrees_of_freedom
-    for stage in earlier_stages:
-        added = np.where(
-            both_determined, stage.slopes @ stage.covariance.matrix @ stage.slopes.T, 0.0
-        )
-        total += added
-        # of each earlier unknown by itself, as if they were independent of each other
-        parts = stage.slopes**2 * np.diag(stage.covariance.matrix)
-        share = parts / np.maximum(parts.sum(axis=1, keepdims=True), 1e-300)
-        inverse = np.sum(share**2 / stage.covariance.degrees_of_freedom, axis=1)
-        spread += np.diag(added) ** 2 * np.maximum(inverse, 1e-300)
     variance = np.diag(total)
     freedom = np.divide(variance**2, spread, out=np.full_like(variance, np.inf), where=spread > 0.0)
     return replace(own, matrix=total, degrees_of_freedom=freedom)
@@ -283,15 +253,13 @@ class Uncertainty(Result):
     """Errors of a fit's estimates: those to quote, and what they rest on."""
 
     own: Covariance
-    """That of the stage's own noise and of the runs' differences."""
+    """That of the noise and of the runs' differences."""
     inflation: Array
     """(K,) samples that stand for one independent one, at least 1, unknown by unknown: the own
     variance over that of white residuals."""
     colours: tuple[NoiseColour, ...]
     noisy: bool
     """Whether there are any residuals at all."""
-    earlier_stages: tuple[EarlierStage, ...]
-    """What earlier stages do not know."""
     systematic: Systematic
     runs: RunToRun | None = None
     """How runs differ, if that is known."""
@@ -302,13 +270,8 @@ class Uncertainty(Result):
 
     @cached_property
     def quoted(self) -> Covariance:
-        """That of the stage's own noise with what is taken for granted."""
-        return with_earlier_stages(self.own, self.earlier_stages, self.systematic)
-
-    @cached_property
-    def sampled(self) -> Covariance:
-        """That of all stages' noise: the quoted one without systematic effects."""
-        return with_earlier_stages(self.own, self.earlier_stages)
+        """The own one with systematic effects."""
+        return with_effects(self.own, self.systematic)
 
     @cached_property
     def estimates(self) -> tuple[Estimate, ...]:
@@ -343,13 +306,10 @@ class Uncertainty(Result):
         return tuple(sentences)
 
     def _widened(self) -> Iterator[str]:
-        """What earlier stages and systematic effects add to the intervals."""
+        """What systematic effects add to the intervals."""
         has_variance = self.own.determined & (np.diag(self.own.matrix) > 0.0)
-        if not has_variance.any() or not (self.earlier_stages or self.systematic):
+        if not has_variance.any() or not self.systematic:
             return
-        causes = ["the uncertainty of earlier stages"] if self.earlier_stages else []
-        if self.systematic:
-            causes.append("possible errors of instruments, fixed parameters and the model")
         wider = np.ones(has_variance.size)
         wider[has_variance] = (
             self.quoted.standard_errors[has_variance] / self.own.standard_errors[has_variance]
@@ -357,9 +317,9 @@ class Uncertainty(Result):
         most = int(np.argmax(wider))
         name = self.own.variables.names[most]
         text = (
-            f"Intervals include {' and '.join(causes)}, which widens them by a factor of "
-            f"{float(np.median(wider[has_variance])):.2f} in the median and of {wider[most]:.2f} "
-            f"for {name}"
+            "Intervals include possible errors of instruments, fixed parameters and the model, "
+            f"which widens them by a factor of {float(np.median(wider[has_variance])):.2f} in the "
+            f"median and of {wider[most]:.2f} for {name}"
         )
         shares = self.budget(most)
         if shares:
@@ -398,7 +358,6 @@ def _end_sentence(name: str, end: CheckedEnd) -> str:
 def uncertainty(
     fit: LinearisedFit,
     *,
-    earlier_stages: Sequence[EarlierStage] = (),
     systematic: Systematic = MappingProxyType({}),
     runs: RunToRun | None = None,
 ) -> Uncertainty:
@@ -408,8 +367,6 @@ def uncertainty(
     ----------
     fit : LinearisedFit
         The fit at its optimum, see `linearised_fit`.
-    earlier_stages : sequence of EarlierStage
-        Estimates that this stage takes for granted.
     systematic : mapping of str to (K,) array
         Changes of the solver's vector for a standard uncertainty of each systematic effect.
     runs : RunToRun, optional
@@ -426,93 +383,81 @@ def uncertainty(
         If there are no more samples than unknowns.
     """
     bounded, fit = fit.variables, released(fit)
-    stage_covariance = replace(with_runs(coloured_noise_covariance(fit), runs), variables=bounded)
+    own = replace(with_runs(coloured_noise_covariance(fit), runs), variables=bounded)
     white = fit.squares / fit.spare_samples * np.sum(fit.whitening**2, axis=1)
     ratio = np.ones_like(white)
     np.divide(
-        np.diag(stage_covariance.matrix),
+        np.diag(own.matrix),
         white,
         out=ratio,
-        where=stage_covariance.determined & (white > 0.0),
+        where=own.determined & (white > 0.0),
     )
     return Uncertainty(
-        own=stage_covariance,
+        own=own,
         inflation=np.maximum(ratio, 1.0),
         colours=noise_colours(fit),
         noisy=fit.squares > 0.0,
-        earlier_stages=tuple(earlier_stages),
         systematic=systematic,
         runs=runs,
     )
 
 
-@once_per_stage
-def uncertainty_of(stage: StageFit) -> Uncertainty:
-    """Errors of a stage's estimates, what it takes for granted and checked ends taken in.
+@once_per_fit
+def uncertainty_of(fit: Optimum) -> Uncertainty:
+    """Errors of a fit's estimates, effects and checked ends taken in.
 
     Raises
     ------
     InputError
         If there are no more samples than unknowns.
     """
-    problem = stage.problem
-    vector = stage.solution.vector
-    effects = effects_of(stage)
+    problem = fit.problem
+    vector = fit.solution.vector
+    effects = effects_of(fit)
     systematic = dict(effects.systematic)
-    changes = slopes_by(stage, problem.uncertain).T
+    changes = slopes_by(fit, problem.uncertain).T
     for deviations, change in zip(problem.uncertain, changes, strict=True):
         systematic[effect_of_fixed(deviations)] = change
-    earlier_stages = []
-    for earlier in stage.earlier:
-        if follows_card(stage, earlier):
-            slopes = slopes_by_earlier(stage, earlier)
-            errors = uncertainty_of(earlier)
-            earlier_stages.append(EarlierStage(errors.sampled, slopes, earlier.stage.name))
-            # an effect acts on this stage by itself, and through what it does to others
-            for effect, change in errors.systematic.items():
-                systematic[effect] = systematic.get(effect, 0.0) + slopes @ change
-    result = uncertainty(
-        stage.linearised, earlier_stages=earlier_stages, systematic=systematic, runs=effects.runs
-    )
+    result = uncertainty(fit.linearised, systematic=systematic, runs=effects.runs)
     result = replace(result, priors=prior_sentences(problem.unknowns, vector, result.quoted))
     if not result.noisy:
         return result
     half_widths = reach(result.own)
-    fit = released(stage.linearised)
+    linearised = released(fit.linearised)
     limits = [
         number
         for number, unknown in enumerate(problem.unknowns)
         if unknown.kind == "parameter" and unknown.targets[0].startswith(tuple(LIMITS))
     ]
-    ends = checked_ends(problem, vector, fit, half_widths, limits)
+    ends = checked_ends(problem, vector, linearised, half_widths, limits)
     return replace(result, ends=tuple(ends))
 
 
-@once_per_stage
-def intervals_of(stage: StageFit) -> tuple[Interval, ...]:
-    """What is known of the error of each unknown of a stage: stored, or as its uncertainty has it.
+@once_per_fit
+def intervals_of(fit: Optimum) -> tuple[Interval, ...]:
+    """What is known of the error of each unknown of a fit: stored, or as its uncertainty has it.
 
     With no more samples than unknowns, no unknown has an interval.
     """
-    if stage.stored is not None:
-        return stage.stored
+    if fit.stored is not None:
+        return fit.stored
     try:
-        computed = uncertainty_of(stage).estimates
+        computed = uncertainty_of(fit).estimates
     except InputError:
-        return (Interval("undetermined"),) * len(stage.problem.unknowns)
+        return (Interval("undetermined"),) * len(fit.problem.unknowns)
     return tuple(
         Interval(estimate.status, estimate.standard_error, estimate.lower, estimate.upper)
         for estimate in computed
     )
 
 
-@once_per_stage
-def estimates_of(stage: StageFit) -> tuple[Estimate, ...]:
-    """Each unknown of a stage with its value, in their order.
+@once_per_fit
+def estimates_of(fit: Optimum) -> tuple[Estimate, ...]:
+    """Each unknown of a fit with its value, in their order.
 
     The intervals are computed when one of them is first asked for, unless they are stored.
     """
-    point = stage.problem.unknowns.at(stage.solution.vector)
+    point = fit.problem.unknowns.at(fit.solution.vector)
     values = point.estimates.tolist()
     return tuple(
         Estimate(
@@ -520,14 +465,14 @@ def estimates_of(stage: StageFit) -> tuple[Estimate, ...]:
             value=values[number],
             unit=unknown.unit,
             run=unknown.run,
-            source=partial(_interval_of, stage, number),
+            source=partial(_interval_of, fit, number),
         )
         for number, unknown in enumerate(point)
     )
 
 
-def _interval_of(stage: StageFit, number: int) -> Interval:
-    return intervals_of(stage)[number]
+def _interval_of(fit: Optimum, number: int) -> Interval:
+    return intervals_of(fit)[number]
 
 
 def released(fit: LinearisedFit) -> LinearisedFit:
@@ -623,17 +568,15 @@ def prior_sentences(unknowns: Unknowns, vector: Array, quoted: Covariance) -> tu
     return tuple(sentences)
 
 
-def unseen_limits(stages: Sequence[StageFit]) -> dict[str, float]:
+def unseen_limits(fit: Optimum) -> dict[str, float]:
     """Limits that may lie anywhere beyond a value, by column, and that value. [SI]
 
     Those that no fitted run reached, from where these ended, and those whose estimate has no upper
     end, from its lower one.
     """
-    runs = {run.name: run for stage in stages for run in stage.problem.experiments}
-    unseen = limits_unreached(list(runs.values()), stages[-1].drive.parameters)
-    for stage in stages:
-        for estimate in estimates_of(stage):
-            one_sided = estimate.upper is None and estimate.lower is not None
-            if estimate.name in LIMIT_COLUMNS and one_sided:
-                unseen.setdefault(estimate.name, float(estimate.lower or 0.0))
+    unseen = limits_unreached(fit.problem.experiments, fit.drive.parameters)
+    for estimate in estimates_of(fit):
+        one_sided = estimate.upper is None and estimate.lower is not None
+        if estimate.name in LIMIT_COLUMNS and one_sided:
+            unseen.setdefault(estimate.name, float(estimate.lower or 0.0))
     return {column: value for column, value in unseen.items() if value > 0.0}

@@ -1,13 +1,10 @@
-"""What the stages of a fit leave open of their machine's numbers, from the errors of all estimates.
+"""What a fit leaves open of its machine's numbers, from the errors of all estimates.
 
-There is one independent error for each principal axis of each stage's own covariance, in which
-priors, noise and the differences of the runs are, and one for each systematic effect
-(`intervals`). What an earlier stage does not know moves the later one as well.
+There is one independent error for each principal axis of the covariance, in which priors, noise and
+the differences of the runs are, and one for each systematic effect (`intervals`).
 """
 
 from __future__ import annotations
-
-from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,7 +12,7 @@ from numpy.typing import NDArray
 from swashplate.identification.estimation.model import EquationModel
 from swashplate.identification.estimation.posterior import Posterior
 from swashplate.identification.estimation.unknowns import Unknowns
-from swashplate.identification.stage_fit import StageFit
+from swashplate.identification.optimum import Optimum
 from swashplate.identification.statistics.effects import effect_of_fixed
 from swashplate.identification.statistics.intervals import Uncertainty, reach, uncertainty_of
 
@@ -26,38 +23,26 @@ NEGLIGIBLE = 1e-9
 """Share of the largest singular value below which an error counts as none. [1]"""
 
 
-def posterior_of(stages: Sequence[StageFit]) -> Posterior:
-    """What the stages of a fit leave open of the machine's numbers.
+def posterior_of(fit: Optimum) -> Posterior:
+    """What a fit leaves open of the machine's numbers.
 
     Raises
     ------
     InputError
-        If a stage has no more samples than unknowns.
+        If there are no more samples than unknowns.
     """
-    sources = list[tuple[int, Array]]()  # number of a stage, and an error of its own vector
-    effects = dict[str, None]()
-    for number, stage in enumerate(stages):
-        uncertainty = uncertainty_of(stage)
-        shared = stage.problem.unknowns.shared
-        nearer = _nearer_ends(uncertainty)
-        matrix = nearer[:, None] * uncertainty.own.matrix * nearer
-        variances, axes = np.linalg.eigh(matrix[np.ix_(shared, shared)])
-        for variance, axis in zip(variances, axes.T, strict=True):
-            error = np.zeros(len(stage.problem.unknowns))
-            error[shared] = np.sqrt(max(float(variance), 0.0)) * axis
-            sources.append((number, error))
-        effects |= dict.fromkeys(uncertainty.systematic)
-    count = len(sources) + len(effects)
-    rows = dict[str, Array]()
-    for number, (stage, own) in enumerate(zip(stages, _own_errors(stages, sources), strict=True)):
-        systematic = uncertainty_of(stage).systematic
-        errors = np.zeros((len(own), count))
-        errors[:, : len(sources)] = own
-        for column, effect in enumerate(effects, len(sources)):
-            errors[:, column] = systematic.get(effect, 0.0)
-        if number == 0:
-            rows |= _of_fixed(stage, list(effects), len(sources), count)
-        rows |= _of_numbers(stage, errors)
+    uncertainty = uncertainty_of(fit)
+    unknowns = fit.problem.unknowns
+    shared = unknowns.shared
+    nearer = _nearer_ends(uncertainty)
+    matrix = nearer[:, None] * uncertainty.own.matrix * nearer
+    variances, axes = np.linalg.eigh(matrix[np.ix_(shared, shared)])
+    own = np.zeros((len(unknowns), variances.size))
+    own[shared] = np.sqrt(np.maximum(variances, 0.0)) * axes
+    systematic = [change[:, None] for change in uncertainty.systematic.values()]
+    errors = np.hstack([own, *systematic])
+    rows = _of_fixed(fit, list(uncertainty.systematic), own.shape[1], errors.shape[1])
+    rows |= _of_numbers(fit, errors)
     names = [name for name, row in rows.items() if row.any()]
     return Posterior(tuple(names), _compressed(np.array([rows[name] for name in names])))
 
@@ -80,26 +65,10 @@ def _nearer_ends(uncertainty: Uncertainty) -> Array:
     return nearer
 
 
-def _own_errors(stages: Sequence[StageFit], sources: Sequence[tuple[int, Array]]) -> list[Array]:
-    """Of each stage (K, sources) errors of its vector, those that follow from earlier ones too."""
-    errors = list[Array]()
-    by_name = dict[str, Array]()
-    for number, stage in enumerate(stages):
-        of_stage = np.zeros((len(stage.problem.unknowns), len(sources)))
-        for earlier in uncertainty_of(stage).earlier_stages:
-            of_stage += earlier.slopes @ by_name[earlier.stage]
-        for column, (origin, error) in enumerate(sources):
-            if origin == number:
-                of_stage[:, column] += error
-        by_name[stage.stage.name] = of_stage
-        errors.append(of_stage)
-    return errors
-
-
-def _of_fixed(stage: StageFit, effects: list[str], first: int, count: int) -> dict[str, Array]:
+def _of_fixed(fit: Optimum, effects: list[str], first: int, count: int) -> dict[str, Array]:
     """(count,) changes of fixed numbers with a standard uncertainty, each by its own effect."""
     rows = dict[str, Array]()
-    for together in stage.problem.uncertain:
+    for together in fit.problem.uncertain:
         effect = effect_of_fixed(together)
         for name, deviation in together.items():
             rows[name] = np.zeros(count)
@@ -107,11 +76,11 @@ def _of_fixed(stage: StageFit, effects: list[str], first: int, count: int) -> di
     return rows
 
 
-def _of_numbers(stage: StageFit, errors: Array) -> dict[str, Array]:
-    """(count,) changes of each number of the machine that a stage moves, from its vector's."""
-    unknowns: Unknowns = stage.problem.unknowns
-    names, model = unknowns.machine_targets, stage.problem.model
-    by_name = unknowns.chain(stage.solution.vector, names, "") @ errors[unknowns.shared]
+def _of_numbers(fit: Optimum, errors: Array) -> dict[str, Array]:
+    """(count,) changes of each number of the machine that a fit moves, from its vector's."""
+    unknowns: Unknowns = fit.problem.unknowns
+    names, model = unknowns.machine_targets, fit.problem.model
+    by_name = unknowns.chain(fit.solution.vector, names, "") @ errors[unknowns.shared]
     if isinstance(model, EquationModel):
         columns, derivatives = model.columns(names)
         return dict(zip(columns, derivatives @ by_name, strict=True))

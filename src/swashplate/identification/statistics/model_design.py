@@ -46,8 +46,7 @@ def model_run_information(setup: ModelSetup, experiments: Sequence[Experiment]) 
     Raises as `ModelSetup.problem`, and a `DomainError` if the model does not hold there.
     """
     problem = setup.problem(experiments)
-    (stage,) = setup.setup.stages
-    return RunInformation(stage, problem, linearised_fit(problem, problem.start))
+    return RunInformation(problem, linearised_fit(problem, problem.start))
 
 
 @dataclass(frozen=True, eq=False)

@@ -12,7 +12,7 @@ from swashplate.errors import InputError
 from swashplate.executors import Executor, Serial
 from swashplate.identification.estimation.problem import Problem
 from swashplate.identification.estimation.unknowns import Unknown
-from swashplate.identification.stage_fit import StageFit
+from swashplate.identification.optimum import Optimum
 from swashplate.identification.statistics.interval_ends import (
     Ending,
     Minimise,
@@ -49,8 +49,6 @@ class Profile(Result):
     """A better optimum that was met; the profile stopped there and its ends mean nothing."""
     name: str = ""
     """The unknown's."""
-    stage: str = ""
-    """That of the unknown."""
     unknown: Unknown | None = None
     """By which its numbers are values; None if only the solver's numbers are given."""
 
@@ -60,7 +58,7 @@ class Profile(Result):
             return []
         columns = (Column(self.name, ".5g"), UNIT, Column("rise of the cost", ".2f", "1"))
         made = Table(
-            f"Profile likelihood of {self.name}, stage {self.stage}",
+            f"Profile likelihood of {self.name}",
             columns,
             "A rise of 1 ends the 95 % interval.",
             si=True,
@@ -123,17 +121,16 @@ def profile(
 
 
 def profiles_of(
-    stage: StageFit,
+    fit: Optimum,
     names: Sequence[str] | None = None,
     *,
     executor: Executor | None = None,
     watch: Callable[[int], None] | None = None,
 ) -> dict[str, Profile]:
-    """Profile likelihoods of a stage's unknowns by name, in their order.
+    """Profile likelihoods of a fit's unknowns by name, in their order.
 
     By default of all unknowns of the machine that have an interval; an `InputError` for a name that
-    is none of the stage's. What earlier stages do not know is not in them. `watch` is called with
-    how many are done.
+    is none of the fit's. `watch` is called with how many are done.
 
     Notes
     -----
@@ -141,9 +138,9 @@ def profiles_of(
     that count as one independent sample: on a linear model exactly the estimate ± q standard
     errors.
     """
-    problem = stage.problem
-    vector = stage.solution.vector
-    errors = uncertainty_of(stage)
+    problem = fit.problem
+    vector = fit.solution.vector
+    errors = uncertainty_of(fit)
     covariance = errors.own
     variables = covariance.variables
     if names is None:
@@ -154,7 +151,7 @@ def profiles_of(
     else:
         numbers = sorted({variables.index(name) for name in names})
     cost = problem.cost(vector)
-    rises = covariance.quantiles**2 * errors.inflation * cost / stage.linearised.spare_samples
+    rises = covariance.quantiles**2 * errors.inflation * cost / fit.linearised.spare_samples
     shared = (
         replace(problem, threads=1),
         vector,
@@ -164,12 +161,11 @@ def profiles_of(
     )
     by_name: dict[str, Profile] = {}
     profiles = (executor or Serial()).run(_profiled, shared, numbers)
-    task = f"Profiling {stage.stage.name}"
-    for position, profile in counted(profiles, len(numbers), "parameters", task):
+    for position, profile in counted(profiles, len(numbers), "parameters", "Profiling"):
         number = numbers[position]
         name = variables.names[number]
         unknown = problem.unknowns.items[number]
-        by_name[name] = replace(profile, name=name, stage=stage.stage.name, unknown=unknown)
+        by_name[name] = replace(profile, name=name, unknown=unknown)
         if watch is not None:
             watch(len(by_name))
     return {variables.names[k]: by_name[variables.names[k]] for k in numbers}

@@ -16,21 +16,19 @@ from swashplate.campaign import Campaign, Overview, WeightWindow, examine, quali
 from swashplate.drive import Drive, KeyNumbers
 from swashplate.errors import InputError
 from swashplate.identification import (
-    CrossValidation,
     Fit,
     Identifiability,
     Identification,
     ModelSetup,
+    Optimum,
     Profile,
     RunQuality,
     Solution,
-    StageFit,
     Verdict,
     assess_fit,
     at_instants,
     estimates_table,
     fixed_table,
-    folds_tables,
     identifiability_of,
     motion_of,
     percent,
@@ -39,7 +37,6 @@ from swashplate.identification import (
     truth_count,
     uncertainty_of,
 )
-from swashplate.identification.diagnostics import starts_of
 from swashplate.identification.estimation import Parameters
 from swashplate.parameters import ParameterSet
 from swashplate.report.fit_report import charts
@@ -84,8 +81,6 @@ def write_fit_report(
 
     Raises
     ------
-    InputError
-        If a profile belongs to no stage.
     FileError
         If the file cannot be written.
 
@@ -95,26 +90,23 @@ def write_fit_report(
     grows with the number of runs, not with their length.
     """
     fit = result.fit
-    stages = fit.stages
-    runs = shown_runs(stages, result.predicted)
+    runs = shown_runs(fit, result.predicted)
     held_out = sum(run.role == "validate" for run in runs)
     facts = (
-        f"{count(len(stages), 'stage')}: {', '.join(stage.stage.name for stage in stages)} · "
         f"{count(len(runs) - held_out, 'run')} fitted, {held_out} held out · "
-        f"{count(sum(stage.problem.samples for stage in stages), 'sample')} that count"
+        f"{count(fit.problem.samples, 'sample')} that count"
     )
     with _units_of_people():
         if motion_of(run.experiment for run in runs) == "rod":
             show_rod()
         sections = [
             _live_section(fit, result.campaign, runs),
-            _parameter_section(fit, stages, truth),
-            _identifiability_section(stages),
+            _parameter_section(fit, truth),
+            _identifiability_section(fit),
             _profile_section(fit, result.profiles),
-            _starts_section(starts_of(stages)),
-            _folds_section(result.folds, stages),
+            _starts_section(fit.starts),
         ]
-        setup = _setup_section(result.campaign, fit.nominal, fit.setup.title, result.notes, stages)
+        setup = _setup_section(result.campaign, fit.nominal, fit.setup.title, result.notes, fit)
         page = _page(
             "Fit",
             facts,
@@ -164,14 +156,14 @@ def write_validation_report(
     FileError
         If the file cannot be written.
     """
-    runs = shown_runs((), predicted)
+    runs = shown_runs(None, predicted)
     samples = sum(prediction.measures.samples for prediction in predicted)
     facts = (
         f"{count(len(runs), 'run')} predicted from the command alone · "
         f"{count(samples, 'sample')} that count"
     )
-    assessed = verdict if verdict is not None else assess_fit((), predicted)
-    setup = _setup_section(campaign, drive, "", notes or {}, ())
+    assessed = verdict if verdict is not None else assess_fit(None, predicted)
+    setup = _setup_section(campaign, drive, "", notes or {}, None)
     if key_numbers is None and isinstance(drive, ParameterSet):
         key_numbers = key_numbers_of(Drive(drive))
     content = _page(
@@ -208,7 +200,7 @@ def _page(
     folder: Path,
 ) -> str:
     """A page of a fit, which has sections of its own, or of a drive held against runs."""
-    stages = fitted.stages if isinstance(fitted, Fit) else ()
+    fit = fitted if isinstance(fitted, Fit) else None
     nominal = fitted.nominal if isinstance(fitted, Fit) else fitted
     named = f"{'Model' if isinstance(nominal, ModelSetup) else 'Drive'} {nominal.name}"
     if isinstance(nominal, ParameterSet) and nominal.title:
@@ -228,9 +220,7 @@ def _page(
         [quality_table(run_qualities, of_run) for run_qualities, of_run in examined.items()]
     )
     sections = [
-        summary_section(
-            verdict, campaign, key_numbers, stages, runs, len(sentences), folder=folder
-        ),
+        summary_section(verdict, campaign, key_numbers, fit, runs, len(sentences), folder=folder),
         _agreement_section(runs, findings, verdict),
         _curves_section(runs, campaign.virtual),
         *other_sections,
@@ -399,7 +389,7 @@ def _setup_section(
     drive: Parameters,
     title: str,
     notes: Mapping[str, str],
-    stages: Sequence[StageFit],
+    fit: Optimum | None,
 ) -> Section:
     table = Table("", (Column(""), Column("")))
     table.add("campaign", str(campaign.path))
@@ -413,22 +403,21 @@ def _setup_section(
         if key != "campaign":
             table.add(key, note)
     blocks = [PageBlock("table", table, "notes")]
-    for stage in stages:
-        blocks.append(PageBlock("heading", f"Stage {stage.stage.name}", "h3"))
-        blocks += listed_block(_stage_sentences(stage))
+    if fit is not None:
+        blocks += listed_block(_task_sentences(fit))
     return Section("setup", "Fit setup", blocks)
 
 
-def _stage_sentences(fit: StageFit) -> list[str]:
-    """Describe the task of a stage."""
-    stage = fit.stage
+def _task_sentences(fit: Optimum) -> list[str]:
+    """Describe what is simulated and fitted."""
+    setup = fit.setup
     problem = fit.problem
-    sentences = [f"Simulates {_PARTS[stage.part]}."]
-    if stage.part == "pump":
-        sentences.append(f"The current is the {stage.current} one.")
+    sentences = [f"Simulates {_PARTS[setup.part]}."]
+    if setup.part == "pump":
+        sentences.append(f"The current is the {setup.current} one.")
     sentences.append(f"Fits {listed(list(problem.channels))}.")
     sentences.append(scales_words(fit))
-    for kind, windows in stage.weights.items():
+    for kind, windows in setup.weights.items():
         sentences += [
             f"Weight on {kind.replace('_', ' ')}: {_weight_text(window)}." for window in windows
         ]
@@ -476,8 +465,8 @@ def _verdict_section(verdict: Verdict, findings: int) -> Section:
 # --- what the data tell ---------------------------------------------------------------------------
 
 
-def _parameter_section(fit: Fit, stages: Sequence[StageFit], truth: ParameterSet | None) -> Section:
-    estimates = [estimates_table(stage, truth=truth) for stage in stages]
+def _parameter_section(fit: Optimum, truth: ParameterSet | None) -> Section:
+    estimates = estimates_table(fit, truth=truth)
     explanation = (
         "Change is from the nominal value. Intervals are for residuals that are correlated over "
         "time. A parameter at a bound has no symmetric interval. Parameter files have SI units."
@@ -491,49 +480,42 @@ def _parameter_section(fit: Fit, stages: Sequence[StageFit], truth: ParameterSet
                 f"estimates. {inside} of {total} intervals contain it."
             )
         )
-    for table, stage in zip(estimates, stages, strict=True):
-        blocks += titled(table, "parameters")
-        of_runs = estimates_table(stage, own=True)
-        if of_runs.rows:
-            summary = f"{count(len(of_runs.rows), 'parameter')} of single runs"
-            blocks.append(
-                PageBlock("details", [PageBlock("table", of_runs, "parameters")], summary)
-            )
-    fixed = fixed_table(fit.stages, truth)
+    blocks += titled(estimates, "parameters")
+    of_runs = estimates_table(fit, own=True)
+    if of_runs.rows:
+        summary = f"{count(len(of_runs.rows), 'parameter')} of single runs"
+        blocks.append(PageBlock("details", [PageBlock("table", of_runs, "parameters")], summary))
+    fixed = fixed_table(fit, truth)
     blocks += titled(fixed, "held") if fixed.rows else []
     return Section("parameters", "Parameters", blocks)
 
 
-def _identifiability_section(stages: Sequence[StageFit]) -> Section:
-    blocks = []
-    for stage in stages:
-        identifiability = identifiability_of(stage)
-        general = [unknown.run is None for unknown in stage.problem.unknowns]
-        blocks.append(PageBlock("heading", f"Stage {stage.stage.name}", "h3"))
-        blocks += listed_block(identifiability.sentences())
-        width = Column("half width", ".3g", "%", none="none")
-        columns = (Column("direction"), width, Column("moves together"))
-        directions = Table("", (*columns, Column("fix")))
-        for direction in identifiability.null + identifiability.weak:
-            kind = "weak" if direction.weak else "null"
-            if direction.gauge:
-                kind = direction.gauge.name
-            moves = ", ".join(
-                f"{name} {change:+.2g} %" for name, change in direction.changes.items()
-            )
-            condition = f"{direction.fix} if known" if direction.weak else direction.fix
-            directions.add(
-                kind, 100.0 * direction.half_width if direction.weak else None, moves, condition
-            )
-        if directions.rows:
-            blocks.append(PageBlock("table", directions, "directions"))
-        blocks.append(PageBlock("heading", "Basis of the intervals", "h4"))
-        try:
-            blocks += listed_block(uncertainty_of(stage).sentences())
-        except InputError as error:
-            blocks.append(text(f"There are no intervals: {error}"))
-        blocks += _effects(identifiability, general)
-        blocks += _correlations(stage, general)
+def _identifiability_section(fit: Optimum) -> Section:
+    blocks = list[PageBlock]()
+    identifiability = identifiability_of(fit)
+    general = [unknown.run is None for unknown in fit.problem.unknowns]
+    blocks += listed_block(identifiability.sentences())
+    width = Column("half width", ".3g", "%", none="none")
+    columns = (Column("direction"), width, Column("moves together"))
+    directions = Table("", (*columns, Column("fix")))
+    for direction in identifiability.null + identifiability.weak:
+        kind = "weak" if direction.weak else "null"
+        if direction.gauge:
+            kind = direction.gauge.name
+        moves = ", ".join(f"{name} {change:+.2g} %" for name, change in direction.changes.items())
+        condition = f"{direction.fix} if known" if direction.weak else direction.fix
+        directions.add(
+            kind, 100.0 * direction.half_width if direction.weak else None, moves, condition
+        )
+    if directions.rows:
+        blocks.append(PageBlock("table", directions, "directions"))
+    blocks.append(PageBlock("heading", "Basis of the intervals", "h4"))
+    try:
+        blocks += listed_block(uncertainty_of(fit).sentences())
+    except InputError as error:
+        blocks.append(text(f"There are no intervals: {error}"))
+    blocks += _effects(identifiability, general)
+    blocks += _correlations(fit, general)
     return Section("identifiability", "Uncertainty", blocks)
 
 
@@ -553,10 +535,10 @@ def _effects(identifiability: Identifiability, shown_mask: Sequence[bool]) -> li
     return [PageBlock("details", [PageBlock("table", table, "effects")], "Sensitivity")]
 
 
-def _correlations(stage: StageFit, general: Sequence[bool]) -> list[PageBlock]:
+def _correlations(fit: Optimum, general: Sequence[bool]) -> list[PageBlock]:
     """The estimates that move together most, if there are any."""
     try:
-        quoted = uncertainty_of(stage).quoted
+        quoted = uncertainty_of(fit).quoted
     except InputError:  # the sentences above say why there are none
         return []
     determined = [k for k, is_general in enumerate(general) if is_general and quoted.determined[k]]
@@ -574,31 +556,26 @@ def _correlations(stage: StageFit, general: Sequence[bool]) -> list[PageBlock]:
     return [PageBlock("details", [block], "Strongest correlations of the estimates")]
 
 
-def _starts_section(several: Mapping[str, Sequence[Solution]]) -> Section:
-    blocks = []
-    for stage, solutions in several.items():
-        failed = sum(not solution.cost < 1e300 for solution in solutions)
-        failures = f"; {failed} left the model's domain" if failed else ""
-        if stage:
-            blocks.append(PageBlock("heading", f"Stage {stage}", "h3"))
-        table = Table("", (Column("start"), Column("cost, best = 1", ".7g"), Column("ended")))
-        best = min(solution.cost for solution in solutions) or 1.0
-        for solution in sorted(solutions, key=lambda solution: solution.cost):
-            if solution.cost < 1e300:
-                table.add(str(solution.number), solution.cost / best, solution.message)
-        explanation = f"Where each of {len(solutions)} starts ended, the best first{failures}."
-        blocks += [text(explanation), PageBlock("table", table, "starts")]
-    return Section("starts", "Starts", blocks)
+def _starts_section(solutions: Sequence[Solution]) -> Section:
+    if len(solutions) < 2:
+        return Section("starts", "Starts", [])
+    failed = sum(not solution.cost < 1e300 for solution in solutions)
+    failures = f"; {failed} left the model's domain" if failed else ""
+    table = Table("", (Column("start"), Column("cost, best = 1", ".7g"), Column("ended")))
+    best = min(solution.cost for solution in solutions) or 1.0
+    for solution in sorted(solutions, key=lambda solution: solution.cost):
+        if solution.cost < 1e300:
+            table.add(str(solution.number), solution.cost / best, solution.message)
+    explanation = f"Where each of {len(solutions)} starts ended, the best first{failures}."
+    return Section("starts", "Starts", [text(explanation), PageBlock("table", table, "starts")])
 
 
 def _profile_section(fit: Fit, profiles: Sequence[Profile]) -> Section:
     tiles = []
     for profile in profiles:
-        unknown = fit.stage(profile.stage).problem.unknowns.items[profile.index]
+        unknown = fit.problem.unknowns.items[profile.index]
         remarks = [text(sentence, "remark") for sentence in profile.sentences()]
-        drawn = PageBlock(
-            "figure", charts.profile_chart(profile, unknown), f"{profile.name} ({profile.stage})"
-        )
+        drawn = PageBlock("figure", charts.profile_chart(profile, unknown), profile.name)
         tiles.append(PageBlock("tile", [drawn, *remarks]))
     explanation = (
         "The lowest cost with one parameter fixed, above that of the optimum; the dashed line ends "
@@ -606,21 +583,3 @@ def _profile_section(fit: Fit, profiles: Sequence[Profile]) -> Section:
     )
     blocks = [text(explanation), PageBlock("tiles", tiles)] if tiles else []
     return Section("profiles", "Profile likelihoods", blocks)
-
-
-def _folds_section(folds: CrossValidation | None, stages: Sequence[StageFit]) -> Section:
-    if folds is None:
-        return Section("folds", "Cross-validation", [])
-    held_out, fold_tables = folds_tables(folds, stages)
-    explanation = (
-        f"The runs were assigned to {folds.planned} folds, with kinds of test and directions "
-        f"spread over them (seed {folds.seed}). Each fold was predicted from the command alone by "
-        "a fit to the others that began at the nominal values."
-    )
-    blocks = [
-        text(explanation),
-        *(text(sentence, "remark") for sentence in folds.sentences()),
-        PageBlock("table", held_out, "held-out"),
-        PageBlock("table", fold_tables, "folds"),
-    ]
-    return Section("folds", "Cross-validation", blocks)

@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 
 from swashplate.campaign import Channel, Experiment
 from swashplate.identification import (
+    Optimum,
     RunQuality,
-    StageFit,
     ignored_windows,
     ignored_words,
     start_words,
@@ -40,11 +40,9 @@ LETTERS = {"input": 13, "overlay": 24, "residual": 14}
 
 @dataclass(frozen=True, eq=False)
 class ShownChannel:
-    """One channel of a run, the stage that fits it, and the units it is shown in."""
+    """One channel of a run, and the units it is shown in."""
 
     quality: RunQuality
-    stage: str
-    """Name of the stage; empty for a run that was held out."""
     unit: DisplayUnit
     """For the signal; of one channel the same in all runs."""
     small: DisplayUnit
@@ -79,13 +77,11 @@ class ShownRun:
     def labels(self) -> list[Any]:
         """Labels of the panels in lines: of the input, then of each channel and its residual."""
         names = [channel.quality.channel for channel in self.channels]
-        several = len({channel.stage for channel in self.channels}) > 1
         kind = self.experiment.input.kind
         first = self.input_unit.label("input" if kind == "other" else kind)
         panel_labels: list[Any] = [in_lines(first, LETTERS["input"])]
         for channel, name in zip(self.channels, names, strict=True):
-            label = f"{name}, {channel.stage}" if names.count(name) > 1 and several else name
-            signal = in_lines(channel.unit.label(label), LETTERS["overlay"])
+            signal = in_lines(channel.unit.label(name), LETTERS["overlay"])
             panel_labels.append(
                 (signal, in_lines(channel.small.label("residual"), LETTERS["residual"]))
             )
@@ -97,27 +93,26 @@ class ShownRun:
         return display_unit(self.experiment.input.unit, _largest_size(self.experiment.input.values))
 
 
-def shown_runs(stages: Sequence[StageFit], predicted: Sequence[RunQuality]) -> tuple[ShownRun, ...]:
-    """All runs, those of the stages first, each with its channels in the order of the stages.
+def shown_runs(fit: Optimum | None, predicted: Sequence[RunQuality]) -> tuple[ShownRun, ...]:
+    """All runs, those that were fitted first; without a fit those that are predicted.
 
     A position is followed by its speed.
     """
     qualities = [
-        (replace(speed, experiment=replace(speed.experiment, role="fit")), stage.stage.name)
-        for stage in stages
-        for speed in with_speeds(stage.runs)
+        replace(speed, experiment=replace(speed.experiment, role="fit"))
+        for speed in with_speeds(fit.qualities if fit else ())
     ]
-    qualities += [(speed, "") for speed in with_speeds(predicted)]
+    qualities += with_speeds(predicted)
     units = {
-        name: _channel_units([quality for quality, _ in qualities if quality.channel == name])
-        for name in {quality.channel for quality, _ in qualities}
+        name: _channel_units([quality for quality in qualities if quality.channel == name])
+        for name in {quality.channel for quality in qualities}
     }
     runs = dict[tuple[str, str], list[ShownChannel]]()
-    for quality, stage in qualities:
+    for quality in qualities:
         run = quality.experiment
         unit, small = units[quality.channel]
         channels = runs.setdefault((run.name, run.role), [])
-        channels.append(ShownChannel(quality, stage, unit, small))
+        channels.append(ShownChannel(quality, unit, small))
     return tuple(ShownRun(name, role, tuple(channels)) for (name, role), channels in runs.items())
 
 
@@ -161,8 +156,8 @@ def measures_line(quality: RunQuality) -> str:
 def write_samples(runs: Sequence[ShownRun], path: str | Path) -> None:
     """Write all samples of runs, measured and simulated, as one table, CSV or Parquet, in SI.
 
-    A row is a sample: ``run``, ``role``, ``stage`` (empty for a run that was held out),
-    ``channel``, ``unit``, ``time`` [s], ``measured``, ``simulated``, ``weight``.
+    A row is a sample: ``run``, ``role``, ``channel``, ``unit``, ``time`` [s], ``measured``,
+    ``simulated``, ``weight``.
 
     Raises
     ------
@@ -179,7 +174,6 @@ def write_samples(runs: Sequence[ShownRun], path: str | Path) -> None:
             columns = {
                 "run": run.name,
                 "role": run.role,
-                "stage": measured.stage,
                 "channel": quality.channel,
                 "unit": channel.unit,
                 "time": channel.time,

@@ -14,7 +14,7 @@ from markupsafe import Markup
 from swashplate.campaign import Campaign
 from swashplate.drive import KeyNumbers
 from swashplate.identification import (
-    StageFit,
+    Optimum,
     Verdict,
     input_correlations,
     percent,
@@ -89,7 +89,7 @@ def summary_section(
     judged: Verdict,
     campaign: Campaign,
     key_numbers: KeyNumbers | None,
-    stages: Sequence[StageFit],
+    fit: Optimum | None,
     runs: Sequence[ShownRun],
     findings: int,
     *,
@@ -117,7 +117,7 @@ def summary_section(
         limits.append(PageBlock("heading", "What limits it", "h3"))
         limits += listed_block(key_numbers.what_limits)
     limits.append(PageBlock("heading", "What to do next", "h3"))
-    limits += listed_block(_next_steps(judged, campaign, stages, runs, findings, folder))
+    limits += listed_block(_next_steps(judged, campaign, fit, runs, findings, folder))
     blocks.append(
         PageBlock("pair", [PageBlock("tile", tile) for tile in (numbers, limits) if tile])
     )
@@ -146,7 +146,7 @@ def _curve_blocks(runs: Sequence[ShownRun], virtual: bool) -> Iterable[PageBlock
 def _next_steps(
     judged: Verdict,
     campaign: Campaign,
-    stages: Sequence[StageFit],
+    fit: Optimum | None,
     runs: Sequence[ShownRun],
     findings: int,
     folder: Path,
@@ -158,24 +158,24 @@ def _next_steps(
     if findings:
         link = Markup('Look into the <a href="#data">{}</a> on the logs.')
         steps.append(link.format(count(findings, "finding")))
-    weak = [name for stage in stages for name in weak_unknowns(stage)]
-    subject = "model" if any(stage.stage.part == "model" for stage in stages) else "drive"
+    weak = weak_unknowns(fit) if fit else []
+    subject = "model" if fit and fit.setup.part == "model" else "drive"
     named = listed(weak[:6]) if len(weak) <= 6 else f"{', '.join(weak[:6])} and others"
     if weak and subject == "model":
         steps.append(f"Not determined to within ±10 %: {named}. Add tests that move them.")
-    elif weak:
+    elif fit and weak:
         code = Markup(
             "Not determined to within ±10 %: {}. The tests that would determine them are ranked, "
             "in the folder of the fit, by <code>{}</code>."
         )
-        steps.append(code.format(named, _advise_command(campaign, stages, folder)))
-    if stages and not any(run.role == "validate" for run in runs):
+        steps.append(code.format(named, _advise_command(campaign, fit, folder)))
+    if fit and not any(run.role == "validate" for run in runs):
         steps.append('Hold a run out of the fit (role = "validate"): nothing was predicted yet.')
     if judged.usable:
         advice = f"Use the {subject}"
         steps.append(f"{advice}. {judged.validity}" if judged.validity else f"{advice}.")
-        if stages and subject == "drive":
-            plus, minus = tested_commands(run for run in stages[0].problem.experiments) or FULL
+        if fit and subject == "drive":
+            plus, minus = tested_commands(fit.problem.experiments) or FULL
             volts = plus or -minus
             code = Markup("Try it in the folder of the fit: <code>{}</code>.")
             step = f"step:{volts:g}"
@@ -183,10 +183,10 @@ def _next_steps(
     return steps
 
 
-def _advise_command(campaign: Campaign, stages: Sequence[StageFit], folder: Path) -> str:
+def _advise_command(campaign: Campaign, fit: Optimum, folder: Path) -> str:
     """The command that ranks further tests, as it runs in the folder of the fit."""
     tests = os.path.relpath(campaign.path, folder)
     command = ["swashplate", "advise", tests, "--drive", FITTED_DRIVE, "--setup", "setup.toml"]
     if len(campaign.axes) > 1:
-        command += ["--axis", stages[0].problem.experiments[0].axis]
+        command += ["--axis", fit.problem.experiments[0].axis]
     return shlex.join(command)

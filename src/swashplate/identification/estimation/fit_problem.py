@@ -1,4 +1,4 @@
-"""Stages of a fit: what is fitted, its fit setup, and the problem of each stage.
+"""What a fit is of: its fit setup, and the problem of that over the runs.
 
 What is fitted is a drive or a user-defined model, `Parameters`; here, and where results are
 written and shown, it is asked which of them.
@@ -9,7 +9,6 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from types import MappingProxyType
 from typing import Literal, TypeVar
 
 import numpy as np
@@ -26,8 +25,6 @@ from swashplate.identification.estimation.drive_model import (
     START_CURRENTS,
     START_PRESSURE,
     DriveModel,
-    Instants,
-    Starts,
     free_zero,
     kinds_of,
     measured_current,
@@ -40,7 +37,6 @@ from swashplate.identification.estimation.setup import (
     FitSetup,
     Free,
     FreeParameters,
-    Stage,
     deviation,
     free_entries,
     load_setup,
@@ -108,10 +104,10 @@ def as_fit_setup(
     Parameters
     ----------
     free : FitSetup, str, path or mapping
-        A fit setup, a packaged one by name, a TOML file, or a mapping: the contents of such
-        a file, or free parameters by symbol as of `setup.free_entries`. Those are estimated in one
-        stage: of the card alone if currents were measured, of pump and motor alone, or through the
-        whole chain if both are free or no current was measured.
+        A fit setup, a TOML file, or a mapping: the contents of such a file, or free parameters by
+        symbol as of `setup.free_entries`. Those are estimated through the card alone if currents
+        were measured, of pump and motor alone, or through the whole chain if both are free or no
+        current was measured.
     experiments : sequence of Experiment
         The runs to fit.
     definitions : Definitions
@@ -125,8 +121,8 @@ def as_fit_setup(
     Examples
     --------
     >>> from swashplate.identification import as_fit_setup
-    >>> [stage.name for stage in as_fit_setup("hoist", ()).stages]
-    ['card', 'pump']
+    >>> as_fit_setup({"Z8": (0.5, 2)}, ()).part
+    'pump'
     """
     if isinstance(free, FitSetup):
         return _with_known_names(free, "the fit setup", definitions)
@@ -135,10 +131,10 @@ def as_fit_setup(
     entries_given: object = free
     if not isinstance(entries_given, Mapping) or not entries_given:
         raise InputError(
-            f"The free parameters are {free!r}, but must be a fit setup, its name or file, or a "
-            "mapping such as {'Z8': (0.5, 2)}."
+            f"The free parameters are {free!r}, but must be a fit setup, its file, or a mapping "
+            "such as {'Z8': (0.5, 2)}."
         )
-    if "stages" in free:
+    if "stages" in free or "free" in free:
         setup = validated(dict(free), FitSetup, "the fit setup")
         return _with_known_names(setup, "the fit setup", definitions)
     entries = free_entries(free, definitions)
@@ -150,17 +146,13 @@ def as_fit_setup(
         part = "pump"
     elif blocks == {"card"} and not kinds.isdisjoint(CURRENTS):
         part = "card"
-    return FitSetup(stages=(Stage(name=part, part=part, free=entries),))
+    return FitSetup(part=part, free=entries)
 
 
 def _with_known_names(setup: FitSetup, origin: str, definitions: Definitions) -> FitSetup:
     """The fit setup of a drive; a name in it that no parameter has is refused."""
-    names = [
-        (f"stage '{stage.name}', free", name)
-        for stage in setup.stages
-        if stage.part != "model"
-        for name in stage.free
-    ]
+    free = () if setup.part == "model" else setup.free
+    names = [("free", name) for name in free]
     names += [("standard_uncertainty", name) for name in setup.standard_uncertainty]
     for table, name in names:
         try:
@@ -176,16 +168,36 @@ def setup_of(
     """The fit setup of an axis.
 
     By default `whole_drive` of the given drive, of its pump alone if currents drive all runs. Of
-    the drive that stands for no machine nothing is known beforehand: it has a packaged setup.
+    the drive that stands for no machine nothing is known beforehand: see `of_any_machine`.
     `free` as of `as_fit_setup`.
     """
     runs = campaign.select(axis=axis, role="fit")
     if free is not None:
         return as_fit_setup(free, runs, drive.definitions)
     if drive.name == UNKNOWN_MACHINE:
-        return load_setup(UNKNOWN_MACHINE)
+        return of_any_machine()
     by_current = all(run.input.kind == "current" for run in runs)
     return whole_drive(drive, part="pump" if by_current else "chain")
+
+
+def of_any_machine() -> FitSetup:
+    """A fit setup of a machine of which nothing is known beforehand: command to motion as a whole.
+
+    Z8 is the lag and Z10 the scale of all speeds, of which the gains G1 tell both ways apart; Z1,
+    Z3, Z4, Z5, Z9 and Z19 are scales that no speed tells.
+    """
+    wide = Free(relative=(0.02, 20.0), log=True)
+    free = {
+        "V_dz": Free(bounds=(0.0, 5.0)),
+        "G1": wide,
+        "Z8": wide,
+        "tau": Free(bounds=(0.0, 0.5)),
+    }
+    return FitSetup(
+        title="a machine of unknown numbers",
+        channels=("shaft_speed", "position", "encoder_counts"),
+        free=free,
+    )
 
 
 def whole_drive(
@@ -193,7 +205,7 @@ def whole_drive(
     spread: float = LIKE_NAMED,
     part: Literal["pump", "chain"] = "chain",
 ) -> FitSetup:
-    """A fit setup of every number that is not 0 or off, in one stage through the whole drive.
+    """A fit setup of every number that is not 0 or off, through the whole drive.
 
     Each is known beforehand to within a share of its nominal value: what the tests determine
     becomes narrower, and what they do not stays as wide as it was, in the intervals as in the
@@ -226,77 +238,71 @@ def whole_drive(
         names = [symbol] if len(moved) == len(parameter.numbers) else moved
         free |= {name: Free(spread=spread) for name in names}
     title = f"every number of {parameters.name}, known to within {100.0 * spread:g} %"
-    return FitSetup(title=title, stages=(Stage(name="drive", part=part, free=free),))
+    return FitSetup(title=title, part=part, free=free)
 
 
-def stage_problem(
-    stage: Stage,
+def problem_of(
+    setup: FitSetup,
     parameters: Parameters,
     experiments: Sequence[Experiment],
     *,
     threads: int | None = None,
-    uncertain: Mapping[str, float | str] = MappingProxyType({}),
-    starts: Starts = MappingProxyType({}),
-    instants: Instants = MappingProxyType({}),
 ) -> Problem:
-    """The problem of a stage, over the runs that have a channel of it.
+    """The problem of a fit, over the runs that have a channel of it.
 
-    `parameters` are the nominal values, those of earlier stages already found; `uncertain` standard
-    uncertainties of what stays fixed, as of `FitSetup`; `starts` and `instants` what a stage before
-    estimated of currents at the first sample, see `start_currents_of`, and of edges. Threads are
-    all cores by default. An `InputError` says that no run has what the stage fits or asks for, a
-    `ParameterError` that a free parameter is unknown or its bounds are wrong.
+    `parameters` are the nominal values. Threads are all cores by default. An `InputError` says that
+    no run has what the setup fits or asks for, a `ParameterError` that a free parameter is unknown
+    or its bounds are wrong.
     """
     threads = threads or available_cores()
     if isinstance(parameters, ModelSetup):
         return parameters.problem(experiments, threads=threads)
-    if stage.part == "model":
+    if setup.part == "model":
         raise InputError("part = 'model' needs a user-defined model, not a drive.")
-    channels = _channels_of(stage, experiments)
+    channels = _channels_of(setup, experiments)
     runs = tuple(run for run in experiments if any(name in run.channels for name in channels))
-    unknowns = _of_the_machine(stage, parameters)
+    unknowns = _of_the_machine(setup, parameters)
     model = DriveModel(
         parameters=_switched_on(parameters, unknowns),
-        part=stage.part,
-        currents=_currents(stage, runs, parameters, starts),
-        forces=stage.forces,
-        starts=dict(starts),
+        part=setup.part,
+        currents=_currents(setup, runs, parameters),
+        forces=setup.forces,
     )
     for run in runs:
-        unknowns += _of_a_run(stage, run, channels, parameters)
-    if stage.part != "pump" or stage.current != "measured":
-        edges = [unknown for run in runs for unknown in unknown_instants(run, instants)]
+        unknowns += _of_a_run(setup, run, channels, parameters)
+    if setup.part != "pump" or setup.current != "measured":
+        edges = [unknown for run in runs for unknown in unknown_instants(run)]
         if len(edges) <= MOST_EDGES:
             unknowns += edges
     return Problem(
         model,
-        tuple(_weighted(run, stage) for run in runs),
+        tuple(_weighted(run, setup) for run in runs),
         Unknowns(tuple(unknowns)),
         channels,
-        noise_scales(runs, channels, least=MODEL_ERROR if stage.has_spreads else 0.0),
+        noise_scales(runs, channels, least=MODEL_ERROR if setup.has_spreads else 0.0),
         uncertain=tuple(
             {
                 column: deviation(doubt, _nominal(parameters, column))
                 for column in parameters.definitions.columns_of([name])
             }
-            for name, doubt in uncertain.items()
+            for name, doubt in setup.standard_uncertainty.items()
         ),
         threads=threads,
     )
 
 
 def _currents(
-    stage: Stage, runs: Sequence[Experiment], parameters: ParameterSet, starts: Starts
+    setup: FitSetup, runs: Sequence[Experiment], parameters: ParameterSet
 ) -> dict[str, Record]:
-    """Currents that drive the pump, by run; none for a stage of another part."""
-    if stage.part != "pump":
+    """Currents that drive the pump, by run; none if another part is fitted."""
+    if setup.part != "pump":
         return {}
     currents = {}
     for run in runs:
-        if stage.current == "measured" or run.input.kind == "current":
-            currents[run.name] = measured_current(run, stage.current_scale)
+        if setup.current == "measured" or run.input.kind == "current":
+            currents[run.name] = measured_current(run, setup.current_scale)
         else:
-            currents[run.name] = simulated_current(run, parameters, starts.get(run.name, {}))
+            currents[run.name] = simulated_current(run, parameters)
     return currents
 
 
@@ -314,42 +320,32 @@ def _switched_on(parameters: ParameterSet, unknowns: Sequence[Unknown]) -> Param
     return parameters.with_numbers(numbers, options)
 
 
-def _channels_of(stage: Stage, experiments: Sequence[Experiment]) -> tuple[str, ...]:
-    """Names of the channels that a stage fits; weights of others would be lost in silence."""
-    kinds = stage.channels or kinds_of(stage.part)
+def _channels_of(setup: FitSetup, experiments: Sequence[Experiment]) -> tuple[str, ...]:
+    """Names of the channels that are fitted; weights of others would be lost in silence."""
+    kinds = setup.channels or kinds_of(setup.part)
     measured = [
         (name, channel.kind) for run in experiments for name, channel in run.channels.items()
     ]
     fitted = {kind for _, kind in measured if kind in kinds}
     if not fitted:
         hint = ""
-        if stage.part == "card":
-            hint = "; without a current, let 'swashplate guess' write start and fit setup"
+        if setup.part == "card":
+            hint = "; without a current, let 'swashplate guess' write a drive to begin with"
         raise InputError(
-            f"The stage '{stage.name}' fits {', '.join(kinds)}, but the runs to fit have "
+            f"The fit setup fits {', '.join(kinds)}, but the runs to fit have "
             f"{', '.join(dict.fromkeys(kind for _, kind in measured)) or 'no channel'}{hint}."
         )
-    weighed = {**stage.weights, **stage.weights_by_input}
+    weighed = {**setup.weights, **setup.weights_by_input}
     if weighed and not fitted & set(weighed):
         raise InputError(
-            f"The stage '{stage.name}' weighs {', '.join(weighed)}, but the runs have "
+            f"The fit setup weighs {', '.join(weighed)}, but the runs have "
             f"{', '.join(sorted(fitted))}: add weights for that, or use a fit setup without."
         )
     return tuple(dict.fromkeys(name for name, kind in measured if kind in kinds))
 
 
-def start_currents_of(problem: Problem, vector: Array) -> Starts:
-    """Currents at the first sample that a stage estimated, by run; for the stages after it."""
-    currents: dict[str, dict[str, float]] = {}
-    values = problem.unknowns.at(vector).estimates.tolist()
-    for unknown, value in zip(problem.unknowns, values, strict=True):
-        if unknown.run is not None and unknown.kind == "start current":
-            currents.setdefault(unknown.run, {})[unknown.name] = value
-    return currents
-
-
 def with_estimates(parameters: Parameters, problem: Problem, vector: Array) -> Parameters:
-    """The parameters with what a stage found; a `DomainError` if a value breaks a rule."""
+    """The parameters with what a fit found; a `DomainError` if a value breaks a rule."""
     numbers = problem.unknowns.targets(vector, "")
     if isinstance(parameters, ModelSetup):
         return replace(parameters, numbers={**parameters.numbers, **numbers}, scales=problem.scales)
@@ -357,16 +353,16 @@ def with_estimates(parameters: Parameters, problem: Problem, vector: Array) -> P
     return problem.model.parameters_at(numbers)
 
 
-def _weighted(experiment: Experiment, stage: Stage) -> Experiment:
-    """The experiment with the stage's own weights multiplied in."""
-    if not stage.weights and not stage.weights_by_input:
+def _weighted(experiment: Experiment, setup: FitSetup) -> Experiment:
+    """The experiment with the fit setup's own weights multiplied in."""
+    if not setup.weights and not setup.weights_by_input:
         return experiment
     channels = {}
     for name, channel in experiment.channels.items():
         weight = channel.weight.copy()
-        for window in applying(stage.weights.get(channel.kind, ()), experiment.maneuver):
+        for window in applying(setup.weights.get(channel.kind, ()), experiment.maneuver):
             weight[inside(window, channel.time)] *= window.factor
-        for sized in applying(stage.weights_by_input.get(channel.kind, ()), experiment.maneuver):
+        for sized in applying(setup.weights_by_input.get(channel.kind, ()), experiment.maneuver):
             within = inside(sized, channel.time)
             size = np.abs(experiment.input.at(channel.time[within]))
             weight[within] *= np.interp(size, *np.transpose(sized.factors))
@@ -374,10 +370,10 @@ def _weighted(experiment: Experiment, stage: Stage) -> Experiment:
     return replace(experiment, channels=channels)
 
 
-def _of_the_machine(stage: Stage, parameters: ParameterSet) -> list[Unknown]:
+def _of_the_machine(setup: FitSetup, parameters: ParameterSet) -> list[Unknown]:
     """Unknowns of the drive: free parameters, both directions apart unless tied, then forces."""
     unknowns: list[Unknown] = []
-    for name, entry in stage.free.items():
+    for name, entry in setup.free.items():
         definition = parameters.definitions.find(name)
         columns = tuple(parameters.definitions.columns_of([name]))
         least = -np.inf if definition.least is None else definition.least
@@ -407,12 +403,12 @@ def _of_the_machine(stage: Stage, parameters: ParameterSet) -> list[Unknown]:
             if about.prior is not None:
                 check_plausible(f"the prior mean of {unknown.name}", definition, about.prior.mean)
             unknowns.append(unknown)
-    if stage.forces is not None:
-        for name, value in stage.forces.values(parameters).items():
+    if setup.forces is not None:
+        for name, value in setup.forces.values(parameters).items():
             force = bounded(
                 name,
                 value,
-                factors=stage.forces.relative,
+                factors=setup.forces.relative,
                 unit="N",
                 log=value > 0.0,
                 kind="force",
@@ -439,7 +435,7 @@ def _nominal(parameters: ParameterSet, column: str) -> float:
 
 
 def _of_a_run(
-    stage: Stage, experiment: Experiment, channels: Sequence[str], parameters: ParameterSet
+    setup: FitSetup, experiment: Experiment, channels: Sequence[str], parameters: ParameterSet
 ) -> Iterator[Unknown]:
     """Unknowns of one experiment: free zeros of positions, pressure and current at the start."""
     run = experiment.name
@@ -448,11 +444,11 @@ def _of_a_run(
     for name, channel in fitted.items():
         if channel.is_position:
             yield free_zero(name, channel, experiment)
-    if stage.part != "card" and (stage.start_pressure is not None or estimated):
-        most = stage.start_pressure or LARGEST_START_PRESSURE
+    if setup.part != "card" and (setup.start_pressure is not None or estimated):
+        most = setup.start_pressure or LARGEST_START_PRESSURE
         yield Unknown(START_PRESSURE, 0.0, -most, most, "Pa", run=run, kind="start pressure")
     measured = any(channel.kind in CURRENTS for channel in fitted.values())
-    if estimated and measured and stage.part != "pump" and experiment.input.kind == "voltage":
+    if estimated and measured and setup.part != "pump" and experiment.input.kind == "voltage":
         first = float(measured_current(experiment).values[0])
         if first != 0.0:  # else neither channel is the driven one
             plus, minus = START_CURRENTS
