@@ -6,6 +6,7 @@ import tomllib
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from importlib.resources import files
+from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
@@ -26,6 +27,7 @@ from swashplate.campaign import Experiment
 from swashplate.drive import Drive
 from swashplate.errors import InputError
 from swashplate.identification import (
+    Fit,
     RunQuality,
     Search,
     drawn_drive,
@@ -39,6 +41,8 @@ from swashplate.parameters import ParameterSet
 SPREAD = 0.02
 """Standard deviation of the logarithm by which the fit's start differs from the truth: well within
 Kruse's bounds, 5 % for Z10. [1]"""
+SETUPS = Path(__file__).parent / "setups"
+"""His two fits of each axis: of the card, then of pump and motor."""
 STARTS = 2
 """Fits of each campaign, of which the better one counts."""
 CHANNELS = {"current": "current", "speed": "speed from counts"}
@@ -117,13 +121,15 @@ class ErrorTables:
 
 def _fitted(nominal: Drive, axis: str, runs: Sequence[Experiment], seed: int) -> ParameterSet:
     """The better of the fits from starts about the nominal drive: one alone is caught at times."""
-    setup = load_setup(f"{axis}-source")
-    starts = [
-        drawn_drive(nominal, setup, STARTS * seed + number, spread=SPREAD)
-        for number in range(STARTS)
-    ]
-    fits = [fit(start.parameters, runs, setup, search=Search(0)) for start in starts]
-    return min(fits, key=lambda each: each.stages[-1].solution.cost).drive.parameters
+    card, pump = (load_setup(SETUPS / f"{axis}-{part}.toml") for part in ("card", "pump"))
+    fits = list[Fit]()
+    for number in range(STARTS):
+        start = nominal
+        for setup in (card, pump):
+            start = drawn_drive(start, setup, STARTS * seed + number, spread=SPREAD)
+        with_card = fit(start.parameters, runs, card, search=Search(0))
+        fits.append(fit(with_card.parameters, runs, pump, search=Search(0)))
+    return min(fits, key=lambda each: each.solution.cost).drive.parameters
 
 
 def _explained(axis: str, seed: int) -> str:

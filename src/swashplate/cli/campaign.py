@@ -440,7 +440,7 @@ def guess(
     """Estimate dead zones, gains, limits, delays and creep of an unknown machine.
 
     Needs logs of the command and of a speed or a position. If a current is
-    measured, the amplifier is estimated from it and fitted first. Writes an
+    measured, the amplifier is estimated from it. Writes an
     initial drive for a fit, start.toml, and the parameters to estimate with
     their bounds, setup.toml.
     """
@@ -474,10 +474,7 @@ def guess(
         show(drafting.amplifier_table(guessed.amplifier))
         card = guessed.amplifier.card
         like = f"like that of the packaged card {card}" if card else "a plain one"
-        say(
-            f"Its filter is {like}; fit {guessed.amplifier.fit_percent:.1f} % of the currents. The "
-            "first stage fits the amplifier to the current, the second one the machine."
-        )
+        say(f"Its filter is {like}; fit {guessed.amplifier.fit_percent:.1f} % of the currents.")
     for sentence, _ in spiked(runs).values():
         note(f"! {sentence}.")
     note(

@@ -42,31 +42,8 @@ SETUP_TEMPLATE = """\
 schema = {1}
 title = "{0}, guessed"
 """
-CHAIN = """
-[[stages]]
-name = "drive"
-part = "chain"
-channels = ["shaft_speed", "position", "encoder_counts"]
-
-[stages.free]
-"""
-AMPLIFIER = """
-# The amplifier, from the current.
-[[stages]]
-name = "amplifier"
-part = "card"
-
-[stages.free]
-"""
-PUMP = """
-# Pump and motor, driven by the current of the fitted amplifier.
-[[stages]]
-name = "pump"
-part = "pump"
-channels = ["shaft_speed", "position", "encoder_counts"]
-
-[stages.free]
-"""
+MOTION = 'channels = ["shaft_speed", "position", "encoder_counts"]\n'
+FREE = "\n[free]\n"
 NO_CREEP = "# {}: Z18 is 0, fixed"
 NOT_TRIED = "# no run goes {}: its numbers are those of the other direction, fixed"
 
@@ -187,8 +164,7 @@ def _with_current(
 def guessed_fit_setup(guess: Guess, start: ParameterSet | Drive) -> str:
     """Text of a fit setup that frees what was guessed, with bounds about it.
 
-    One stage from the command to the motion, or, if a current was measured, one of the amplifier
-    and one of the pump.
+    From the command to the motion; if a current was measured, amplifier and pump apart.
     """
     numbers, text = set_of(start).numbers, SETUP_TEMPLATE.format(guess.axis, SCHEMA)
     longest = max(2.0 * guess.delay, guess.delay + 0.1)
@@ -199,13 +175,12 @@ def guessed_fit_setup(guess: Guess, start: ParameterSet | Drive) -> str:
             _offset_line(guess, numbers) if guess.creep else NO_CREEP.format(_without_creep(guess))
         )
         lines += [*_limit_lines(guess), _lag_line(guess, 5.0), delay, creep]
-        return text + CHAIN + "\n".join(lines) + "\n"
+        return text + MOTION + FREE + "\n".join(lines) + "\n"
     of_current = _command_lines(numbers, guess.amplifier.command, (True, True))
     of_current += [*_dynamics_lines(numbers), delay]
     # the guess's lag is that of amplifier and pump
     of_motion = [*_solenoid_lines(guess, numbers), *_limit_lines(guess), _lag_line(guess, 20.0)]
-    text += AMPLIFIER + "\n".join(of_current) + "\n"
-    return text + PUMP + "\n".join(of_motion) + "\n"
+    return text + FREE + "\n".join([*of_current, *of_motion]) + "\n"
 
 
 def _command_lines(
