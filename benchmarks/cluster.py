@@ -17,9 +17,10 @@ from distributed import LocalCluster
 from swashplate import Campaign, rig
 from swashplate.executors import Dask, Serial
 from swashplate.identification import Solution, load_setup, sobol_starts, solve_from
-from swashplate.identification.estimation.stages import stage_problem
+from swashplate.identification.estimation.fit_problem import problem_of
 
 WORKERS, STARTS = 3, 16
+CARD = Path(__file__).parents[1] / "reproduction" / "setups" / "hoist-card.toml"
 
 
 def main() -> None:
@@ -28,8 +29,7 @@ def main() -> None:
         tests = rig.run("hoist", seed=1, perturb=0.1)
         campaign = Campaign.from_toml(rig.write(tests, Path(folder) / "virtual"))
         runs = campaign.select(role="fit")
-        stage = load_setup("hoist").stages[0]
-        problem = stage_problem(stage, campaign.drive("hoist").parameters, runs, threads=1)
+        problem = problem_of(load_setup(CARD), campaign.drive("hoist").parameters, runs, threads=1)
         starts = [problem.start, *sobol_starts(problem, STARTS - 1, seed=1)]
         alone = solve_from(problem, starts, executor=Serial())
         with LocalCluster(

@@ -98,8 +98,7 @@ def fitted(axis, seed, folder):
 def judged(result, held_out, damaged):
     """Who is named, and whether the fit is usable, after damage to some held-out runs."""
     predicted = predict(result.fit.parameters, held_out)
-    planned = [stage.name for stage in result.fit.setup.stages]
-    verdict = assess_fit(result.fit.stages, predicted, planned=planned)
+    verdict = assess_fit(result.fit, predicted)
     named = {finding.run for finding in verdict.unsound}
     names = {run.name for run in held_out}
     return {

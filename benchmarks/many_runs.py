@@ -22,7 +22,7 @@ from campaign_file import campaign_text
 from command_line import Program
 
 from swashplate import Drive, rig
-from swashplate.identification import drawn_drive, load_setup
+from swashplate.identification import drawn_drive, whole_drive
 from swashplate.maneuvers import source_tests
 
 COUNTS_PER_TURN = 2526.315789473684
@@ -41,7 +41,8 @@ CHANNELS = {
 
 def machine() -> Drive:
     """The virtual hoist, a few per cent off the published one."""
-    truth = drawn_drive(Drive.preset("hoist"), load_setup("hoist"), 1)
+    hoist = Drive.preset("hoist")
+    truth = drawn_drive(hoist, whole_drive(hoist.parameters), 1)
     return Drive(replace(truth.parameters, card_switch="split"))
 
 

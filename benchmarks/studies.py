@@ -15,8 +15,8 @@ from swashplate.identification import (
     Identification,
     fit,
     identifiability_of,
-    load_setup,
     uncertainty_of,
+    whole_drive,
 )
 from swashplate.report.fit_report import write_fit_report
 
@@ -27,11 +27,12 @@ MARCHED, STUDIED = 0.1, 5.0
 
 
 def fit_study_rows() -> Iterator[Row]:
-    """The hoist's fit setup on a realistic virtual campaign: fit, judging, report."""
+    """Every number of the hoist on a realistic virtual campaign: fit, judging, report."""
     with tempfile.TemporaryDirectory() as folder:
         tests = rig.run("hoist", seed=1, perturb=0.1)
         campaign = Campaign.from_toml(rig.write(tests, Path(folder) / "virtual"))
-        nominal, setup = campaign.drive("hoist").parameters, load_setup("hoist")
+        nominal = campaign.drive("hoist").parameters
+        setup = whole_drive(nominal)
         runs = campaign.select(role="fit")
         fitted, judged, written = [], [], []
         # the first round is not counted: it compiles, or loads what was compiled
@@ -40,17 +41,15 @@ def fit_study_rows() -> Iterator[Row]:
             found = Identification(campaign, fit(nominal, runs, setup))
             fitted.append(time.perf_counter() - begin)
             begin = time.perf_counter()
-            # what a stage says is computed where it is asked for; the verdict predicts and refits
-            stages = found.fit.stages
-            for each in stages:
-                _ = identifiability_of(each), uncertainty_of(each), each.runs
+            # what a fit says is computed where it is asked for; the verdict predicts and refits
+            _ = identifiability_of(found.fit), uncertainty_of(found.fit), found.fit.qualities
             _ = found.verdict
             judged.append(time.perf_counter() - begin)
             begin = time.perf_counter()
             page = Path(folder) / "report.html"
             write_fit_report(found, page)
             written.append(time.perf_counter() - begin)
-        yield _limited("complete staged fit of a virtual hoist", median(fitted[1:]), FIT)
+        yield _limited("complete fit of a virtual hoist", median(fitted[1:]), FIT)
         yield Row("what the fit is worth: intervals, tests", duration(median(judged[1:])))
         yield _limited("its report", median(written[1:]), REPORT)
 

@@ -54,8 +54,8 @@ PARAMETERS = """\
 A drive in numbers. `swashplate show hoist --toml > mine.toml` writes one to start from; symbols,
 units and ranges: [nomenclature](../nomenclature.md)."""
 SETUP = """\
-The parameters that a fit estimates, stage by stage. `swashplate advise` shows which of
-them your tests determine; [identification](../identification.md) has an example."""
+The parameters that a fit estimates, if not every number of the drive. `swashplate advise` shows
+which of them your tests determine; [identification](../identification.md) has an example."""
 
 
 def api_pages() -> Iterator[tuple[str, str]]:

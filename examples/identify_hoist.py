@@ -4,7 +4,7 @@
 #     .venv/bin/python examples/identify_hoist.py [--out identified] [--figure identified.png]
 #
 # From the logs of its tests to a drive that predicts others. The hoist is a virtual one, so that
-# the truth can stand beside the estimates: in all that is to be found it differs by some 5 % from
+# the truth can stand beside the estimates: every number differs by some 5 % from that of
 # the published one, which the fit starts from. With logs of your own, begin at "The campaign".
 
 # %%
@@ -17,11 +17,11 @@ import numpy as np
 from swashplate import Campaign, Drive, identify, rig
 from swashplate.identification import (
     drawn_drive,
-    load_setup,
     run_information,
     smooth,
     true_value,
     uncertainty_of,
+    whole_drive,
     with_speeds,
 )
 from swashplate.report.figures import plot_channel, save_figure
@@ -37,8 +37,9 @@ options = parser.parse_args([] if "ipykernel" in sys.modules else None)
 # ammeter that does not know the sign, and an encoder. The same seed gives the same logs.
 
 # %%
-setup = load_setup("hoist")  # what is free, within which bounds, and in which order it is fitted
-truth = drawn_drive(Drive.preset("hoist").at_every_rate(), setup, seed=1)
+nominal = Drive.preset("hoist").at_every_rate()
+setup = whole_drive(nominal.parameters)  # every number, known beforehand to within 30 %
+truth = drawn_drive(nominal, setup, seed=1)
 tests = rig.run("hoist", truth=truth, seed=1)
 path = rig.write(tests, options.out / "virtual", overwrite=True)
 
@@ -59,22 +60,18 @@ print(f"{len(runs)} runs to fit, {len(held_back)} held back")
 # can only be told together, is said before anything is fitted.
 
 # %%
-for stage in setup.stages:
-    information = run_information(stage, smooth(start), runs)
-    print(f"{stage.name}: {len(information.problem.unknowns.names)} parameters")
-    for sentence in information.sentences():
-        print(f"  {sentence}")
+information = run_information(setup, smooth(start), runs)
+print(f"{len(information.problem.unknowns.names)} parameters")
+for sentence in information.sentences():
+    print(f"  {sentence}")
 
 # %% [markdown]
 # ## The fit
-# The card from its current, then pump and motor from the shaft's position, driven by the current
-# that the fitted card makes.
+# All numbers at once, from the ammeter and from the shaft's position.
 
 # %%
 result = identify(campaign, free=setup)
-for each in result.fit.stages:
-    ended = "converged" if each.solution.converged else each.solution.message
-    print(f"{each.stage.name}: {ended}")
+print("converged" if result.fit.solution.converged else result.fit.solution.message)
 
 # %% [markdown]
 # ## The estimates, and the truth
@@ -84,20 +81,19 @@ for each in result.fit.stages:
 SHOWN = ("V_dz_plus", "G1_plus", "omega_plus", "Z8", "Z10", "Z13_plus", "Z16_plus")
 true, inside = {}, []
 print("              truth   estimate     95 % from         to")
-for stage in result.fit.stages:
-    problem = stage.problem
-    for unknown, each in zip(problem.unknowns, uncertainty_of(stage).estimates, strict=True):
-        value = true_value(unknown, problem.model, truth.parameters)
-        if value is None:  # the zero of a run's position
-            continue
-        true[unknown.name] = value
-        if each.lower is not None and each.upper is not None:
-            inside.append(each.lower <= value <= each.upper)
-            ends = f"{each.lower:10.4g} {each.upper:10.4g}"
-        else:
-            ends = each.status
-        if unknown.name in SHOWN:
-            print(f"{unknown.name:10s} {value:10.4g} {each.value:10.4g}    {ends}")
+problem = result.fit.problem
+for unknown, each in zip(problem.unknowns, uncertainty_of(result.fit).estimates, strict=True):
+    value = true_value(unknown, problem.model, truth.parameters)
+    if value is None:  # the zero of a run's position
+        continue
+    true[unknown.name] = value
+    if each.lower is not None and each.upper is not None:
+        inside.append(each.lower <= value <= each.upper)
+        ends = f"{each.lower:10.4g} {each.upper:10.4g}"
+    else:
+        ends = each.status
+    if unknown.name in SHOWN:
+        print(f"{unknown.name:10s} {value:10.4g} {each.value:10.4g}    {ends}")
 print(f"{sum(inside)} of {len(inside)} intervals hold the truth")
 
 # %% [markdown]

@@ -741,11 +741,10 @@ def _setup_beside(drive: str | None) -> str | None:
 def _show_determined(information: RunInformation, run_names: Sequence[str]) -> None:
     """Print what the runs determine of the parameters."""
     show(information.table(run_names))
-    # what no run exercises is said with its reason
-    bullets(replace(information.identifiability, unexcited=()).sentences(), information.sentences())
+    bullets(information.sentences())
     note("")
     for number, name in enumerate(run_names, start=1):
         note(f"run {number}: {name}")
     say(INFORMATION)
-    if information.identifiability.complete:
+    if information.identifiability.complete and not information.is_known_beforehand:
         note("The fit setup needs no change.")

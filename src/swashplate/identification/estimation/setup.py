@@ -225,14 +225,15 @@ class FitSetup(Document):
         if not isinstance(content, Mapping) or "stages" not in content:
             return content
         stages = content["stages"]
-        if not isinstance(stages, Sequence) or len(stages) != 1:
+        single = stages[0] if isinstance(stages, Sequence) and len(stages) == 1 else None
+        if not isinstance(single, Mapping):
             raise ValueError(
                 "a fit has no stages any more: write each into a file of its own, without "
                 "[[stages]], and fit them one after another, each --from the folder of the one "
                 "before; or leave out --setup, and all numbers are fitted at once"
             )
         others = {key: value for key, value in content.items() if key != "stages"}
-        return others | {key: value for key, value in stages[0].items() if key != "name"}
+        return others | {key: value for key, value in single.items() if key != "name"}
 
     @model_validator(mode="after")
     def _consistent(self) -> FitSetup:

@@ -35,6 +35,7 @@ from swashplate.identification.estimation.setup import FitSetup
 from swashplate.identification.estimation.unknowns import Unknowns
 from swashplate.identification.noise import spectral_covariance
 from swashplate.identification.statistics.determination import Identifiability, identifiability
+from swashplate.identification.statistics.intervals import prior_sentences
 from swashplate.maneuvers import Maneuver, multisine, ramp, sine, stairs, step
 from swashplate.parameters import (
     CATALOGUE,
@@ -89,20 +90,38 @@ class RunInformation(Result):
     @cached_property
     def shares(self) -> dict[str, dict[str, float]]:
         """Share of each run in the information on an unknown, by unknown and run."""
+        total = np.maximum(sum(self._squares.values()), 1e-300)
+        indices = {name: self.linearised.variables.index(name) for name in self.names}
+        return {
+            name: {run: float(of_run[k] / total[k]) for run, of_run in self._squares.items()}
+            for name, k in indices.items()
+        }
+
+    @cached_property
+    def _squares(self) -> dict[str, Array]:
+        """(K,) squared lengths of the derivatives of each run's residuals, by run."""
         fit = self.linearised
         squares = {run.name: np.zeros(len(fit.variables)) for run in self.problem.experiments}
         for run, jacobian in fit.jacobians():
             squares[run.name][fit.variables.columns(run.name)] += np.sum(jacobian**2, axis=0)
-        total = np.maximum(sum(squares.values()), 1e-300)
-        shares = dict[str, dict[str, float]]()
-        for name in self.names:
-            k = fit.variables.index(name)
-            shares[name] = {run: float(of_run[k] / total[k]) for run, of_run in squares.items()}
-        return shares
+        return squares
 
-    def effect(self, name: str) -> float:
-        """Length of the change of all weighted residuals for 1 % of an unknown; 1 is one noise."""
-        return float(self.identifiability.sensitivity[self.linearised.variables.index(name)])
+    @cached_property
+    def effects(self) -> dict[str, float]:
+        """Length of the change of all residuals for 1 % of each unknown; 1 is one noise.
+
+        Of the runs alone, whatever is known beforehand.
+        """
+        fit = self.linearised
+        of_runs = np.sqrt(sum(self._squares.values()))
+        with_priors = np.maximum(np.linalg.norm(fit.triangle, axis=0), 1e-300)
+        lengths = self.identifiability.sensitivity * of_runs / with_priors
+        return {name: float(lengths[fit.variables.index(name)]) for name in self.names}
+
+    @property
+    def is_known_beforehand(self) -> bool:
+        """Whether something is known of each number of the machine before the tests."""
+        return all(unknown.prior for unknown in self.problem.unknowns if unknown.run is None)
 
     def required_excitation(self, name: str) -> str:
         """What a test must reach to inform of an unknown; by default a tilted swash plate."""
@@ -115,14 +134,21 @@ class RunInformation(Result):
         return (definition.needs if definition is not None else "") or "a tilted swash plate"
 
     def sentences(self) -> tuple[str, ...]:
-        """Sentences on unknowns that no run informs of, and on those that one run only does."""
-        return (*self._unexcited_sentences(), *self._single_run_sentences())
+        """What the runs determine, what no run informs of, and what one run only does."""
+        # what no run exercises is said with its reason
+        determined = replace(self.identifiability, unexcited=()).sentences()
+        if self.is_known_beforehand:
+            fit = self.linearised
+            errors = np.sqrt(np.sum(fit.whitening**2, axis=1))
+            determined = prior_sentences(self.problem.unknowns, fit.variables.vector, errors)
+        return (*determined, *self._unexcited_sentences(), *self._single_run_sentences())
 
     def _unexcited_sentences(self) -> Iterator[str]:
         """One sentence for all unknowns that need the same excitation."""
         names_by_reason: dict[str, list[str]] = {}
-        for name in self.identifiability.unexcited:
-            if name in self.names:
+        least = 1e-14 * max(self.effects.values(), default=0.0)
+        for name, effect in self.effects.items():
+            if effect <= least:
                 names_by_reason.setdefault(self._unexcited_reason(name), []).append(name)
         for reason, names in names_by_reason.items():
             verb = "needs" if len(names) == 1 else "need"
@@ -136,7 +162,7 @@ class RunInformation(Result):
             remedy = "ask for forces at smaller currents"
         else:
             excitation = self.required_excitation(name)
-            remedy = "fix it"
+            remedy = "leave it as known" if self.is_known_beforehand else "fix it"
         direction = ""
         if "_plus" in name:
             direction = " (plus)"
@@ -149,11 +175,14 @@ class RunInformation(Result):
     def _single_run_sentences(self) -> Iterator[str]:
         if len(self.problem.experiments) < 2:
             return
+        names_by_run: dict[str, list[str]] = {}
         for name, shares in self.shares.items():
             run = max(shares, key=lambda run_name: shares[run_name])
             if shares[run] >= SINGLE_RUN_SHARE:
-                percentage = f"{100.0 * shares[run]:.0f} %"
-                yield f"{name}: {percentage} of its information is from {run} alone."
+                names_by_run.setdefault(run, []).append(name)
+        for run, names in names_by_run.items():
+            share = f"{100.0 * SINGLE_RUN_SHARE:.0f} %"
+            yield f"{listed(names)}: {share} of the information or more is from {run} alone."
 
     def table(self, runs: Sequence[str] = ()) -> Table:
         """What runs tell of each unknown, one letter a run; in a file their shares."""
@@ -171,7 +200,7 @@ class RunInformation(Result):
             table.add(
                 name,
                 self.required_excitation(name),
-                self.effect(name),
+                self.effects[name],
                 "".join(_letter(share) for share in shares_of_runs),
                 *shares_of_runs,
             )

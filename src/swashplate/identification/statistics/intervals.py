@@ -419,7 +419,9 @@ def uncertainty_of(fit: Optimum) -> Uncertainty:
     for deviations, change in zip(problem.uncertain, changes, strict=True):
         systematic[effect_of_fixed(deviations)] = change
     result = uncertainty(fit.linearised, systematic=systematic, runs=effects.runs)
-    result = replace(result, priors=prior_sentences(problem.unknowns, vector, result.quoted))
+    result = replace(
+        result, priors=prior_sentences(problem.unknowns, vector, result.quoted.standard_errors)
+    )
     if not result.noisy:
         return result
     half_widths = reach(result.own)
@@ -541,14 +543,14 @@ class _PriorShare(NamedTuple):
         )
 
 
-def prior_sentences(unknowns: Unknowns, vector: Array, quoted: Covariance) -> tuple[str, ...]:
+def prior_sentences(unknowns: Unknowns, vector: Array, errors: Array) -> tuple[str, ...]:
     """What priors of the machine add, and which estimates lie far from theirs.
 
     Of a few each has a sentence; of many those are named that the tests narrow, and those that they
-    leave as they were.
+    leave as they were. `errors` are standard errors (K,) of the vector.
     """
     priors = list[_PriorShare]()
-    for unknown, number, error in zip(unknowns, vector, quoted.standard_errors, strict=True):
+    for unknown, number, error in zip(unknowns, vector, errors, strict=True):
         prior = unknown.prior
         if prior is None or unknown.run is not None:
             continue
