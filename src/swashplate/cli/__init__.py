@@ -40,6 +40,11 @@ Maneuvers, and some of the options that may follow their numbers:
   step:9,stop=4,length=8  an option is written name=value
   "step +9 V"             a test of Kruse (2001), by its name
 """
+GONE = {
+    "--folds": "give some runs role = 'validate', which the fit does not see and is judged by",
+    "--joint": "all numbers are estimated at once",
+}
+"""What to do in place of options of earlier versions."""
 EPILOG = """\
 Examples:
   swashplate show                                     the packaged drives
@@ -150,6 +155,11 @@ class Commands(TyperGroup):
             say_error(error)
         except MemoryError:
             say_error(MemoryError("There is not enough memory for that many samples"))
+        except Exception as error:  # of the parser, which names the option
+            option = getattr(error, "option_name", "")
+            if option not in GONE:
+                raise
+            say_error(InputError(f"There is no {option} any more: {GONE[option]}"))
         raise typer.Exit(2)
 
 
