@@ -15,6 +15,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.text import Text
 from tests.marks import rest_slow
 
 from swashplate import Drive, FileError, FullOrderDrive, InputError, Limit, Simulation, maneuvers
@@ -31,6 +32,7 @@ from swashplate.analysis import (
     what_if,
 )
 from swashplate.full_order import compare
+from swashplate.identification import Band
 from swashplate.machine import Definition, Machine, Model, Run, discretised, equation, simulate
 from swashplate.report import figures
 from swashplate.report.figures import plot_simulation, save_figure
@@ -487,3 +489,20 @@ def test_a_model_whose_types_only_a_function_knows_is_shown_by_its_names() -> No
     tank = Model("tank", Gain, Level, filled)
     figure = simulate(Machine(tank, Gain(2.0)), {"inflow": np.ones(9)}, 10.0).plot()
     assert labels(figure) == ["inflow", "level"]
+
+
+def test_a_band_lies_about_the_speed() -> None:
+    """Drawn from its lower to its upper end, and named in the legend."""
+    run = Drive.preset("hoist").simulate(maneuvers.step(4.0))
+    half_width = np.linspace(0.0, 0.5, run.time.size)
+    band = Band(run.time, run.shaft_speed, half_width, 10.0)
+    figure = plot_simulation(run, band=band)
+    speed = figure.axes[-1]
+    (drawn,) = speed.collections
+    heights = drawn.get_paths()[0].vertices[:, 1]
+    ends = np.degrees([band.lower, band.upper])
+    assert heights.min() == pytest.approx(ends.min())
+    assert heights.max() == pytest.approx(ends.max())
+    low, high = speed.get_ylim()
+    assert low < ends.min() < ends.max() < high
+    assert "band of 95 %" in [text.get_text() for text in figure.findobj(Text)]

@@ -68,7 +68,7 @@ def simulate(
     long each limit acted (the dead zone only while the command is not 0 V). Of a
     machine of your own: lowest, highest and last value of each signal, and how
     long each limit acted. Of a fitted drive also the band in which the machine's
-    own speed lies. --out writes all signals, --plot draws them.
+    own speed lies. --out writes all signals, --plot draws them, with the band.
     'swashplate --help' lists the maneuvers.
     """
     with spinner("Simulating"):
@@ -78,7 +78,9 @@ def simulate(
         band = trials.band_of(machine, run)
     save(out, "All signals, in SI", lambda path: write_table(_with_band(run, band), path))
     window = trials.window_of(run.time, begin, end)
-    if plot is not None:
+    if band is not None:
+        draw_figure(plot, "plot_simulation", run, band=band, window=window, title=title)
+    elif plot is not None:
         draw_figure(plot, run.plot(window=window, title=title))
     duration = f"{run.time[-1] - run.time[0]:.6g} s"
     machine.note(f"{title}: {run.time.size} samples at {run.record.rate:g} Hz, {duration}")

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from itertools import cycle
 from math import inf, isfinite
-from typing import NamedTuple, overload
+from typing import TYPE_CHECKING, NamedTuple, overload
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -57,6 +57,9 @@ from swashplate.report.style import (
 from swashplate.results import GivenAxes
 from swashplate.units import display_unit
 
+if TYPE_CHECKING:
+    from swashplate.identification import Band
+
 Flags = NDArray[np.int8]
 Stops = tuple[float, float]
 
@@ -64,6 +67,8 @@ WIDE, NARROW = 1.9, 0.9
 """Widths of two lines that lie on one another for long. [pt]"""
 NEAR = 0.3
 """A line that marks a limit is shown if the signal goes at least this share of the way to it."""
+FAINT = 0.25
+"""Opacity of a band."""
 FAR = 0.3
 """A signal whose range is less than this share of its largest value stays far from zero."""
 
@@ -100,11 +105,14 @@ class Panel(NamedTuple):
     """Range that is shown at least, SI, so that rounding looks like nothing."""
     from_zero: bool = True
     """Whether zero is shown however far the signals stay from it."""
+    between: tuple[Array, Array] | None = None
+    """Both ends of a band about the signal, SI."""
 
 
 def plot_simulation(
     simulation: Simulation,
     *,
+    band: Band | None = None,
     window: tuple[float, float] | None = None,
     title: str | None = None,
 ) -> Figure:
@@ -114,6 +122,8 @@ def plot_simulation(
     ----------
     simulation : Simulation
         What to show. Voltage has a panel only if the simulation was driven by one.
+    band : Band, optional
+        Of a fitted drive: where the machine's own speed lies.
     window : (float, float), optional
         First and last instant to show [s].
 
@@ -153,7 +163,13 @@ def plot_simulation(
             "stroking pressure", "Pa", (Curve(run.stroker_pressure, BLUE),), acting(Limit.RELIEF)
         ),
         swash._replace(limits=acting(Limit.SWASH_STOP)),
-        Panel("shaft speed", "rad/s", (Curve(run.shaft_speed, BLUE),), acting(Limit.SWASH_STOP)),
+        Panel(
+            "shaft speed",
+            "rad/s",
+            (Curve(run.shaft_speed, BLUE),),
+            acting(Limit.SWASH_STOP),
+            between=None if band is None else (band.lower, band.upper),
+        ),
     ]
     if run.voltage is not None:
         panels.insert(0, Panel("voltage", "V", (Curve(run.voltage, INK),)))
@@ -423,7 +439,10 @@ def _legend(panels: Sequence[Panel], shades: Sequence[Shade]) -> list[Patch]:
     acting = set[Shade]()
     for panel in panels:
         acting.update(look for look, spans in panel.limits if spans.size)
-    return [shade_handle(shade) for shade in shades if shade in acting]
+    handles = [shade_handle(shade) for shade in shades if shade in acting]
+    if any(panel.between is not None for panel in panels):
+        handles.append(Patch(color=VERMILION, alpha=FAINT, linewidth=0.0, label="band of 95 %"))
+    return handles
 
 
 def _draw_panel(ax: Axes, panel: Panel, time: Array, rows: slice) -> None:
@@ -440,8 +459,14 @@ def _draw_panel(ax: Axes, panel: Panel, time: Array, rows: slice) -> None:
     ax.set_ylabel(label, fontsize=NORMAL, color=INK)
     zero_line(ax)
     curves = [factor * trace.values[rows] for trace in panel.traces]
-    low = min(float(curve.min()) for curve in curves)
-    high = max(float(curve.max()) for curve in curves)
+    bands = [factor * end[rows] for end in panel.between or ()]
+    low = min(float(curve.min()) for curve in (*curves, *bands))
+    high = max(float(curve.max()) for curve in (*curves, *bands))
+    if bands:
+        lower, upper = bands
+        ax.fill_between(
+            time[rows], lower, upper, color=VERMILION, alpha=FAINT, linewidth=0.0, zorder=1.2
+        )
     labels = []
     for mark in panel.marks:
         level = factor * mark.level
