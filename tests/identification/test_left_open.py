@@ -65,7 +65,7 @@ def two_numbers(tmp_path_factory: pytest.TempPathFactory) -> Identification:
 
 
 def test_its_variances_are_those_of_the_estimates(two_numbers: Identification) -> None:
-    posterior = posterior_of(two_numbers.fit.stages)
+    posterior = posterior_of(two_numbers.fit)
     errors = dict(zip(posterior.names, np.sqrt(np.diag(posterior.covariance)), strict=True))
     assert set(errors) == {"Z8", "Z10"}
     for name, error in errors.items():
@@ -128,8 +128,7 @@ def test_the_machine_lies_in_the_band(
 @pytest.mark.slow
 def test_a_motion_beyond_the_tests_is_known_less(encoder_alone: Identification) -> None:
     prediction = encoder_alone.verdict.error
-    assert prediction.faster is not None
-    assert prediction.faster.frequency == 0.5
+    assert [part.motion for part in prediction.beyond] == ["a sine of 0.5 Hz"]
     slow, fast = (encoder_alone.band(maneuvers.sine(8.0, hertz)) for hertz in (0.1, 1.0))
     assert np.mean(fast.half_width) > np.mean(slow.half_width)
 
@@ -154,4 +153,4 @@ def test_a_run_that_is_predicted_has_its_band(
     assert predict(encoder_alone.drive, tests.experiments)[0].left_open is None
     of_fit = encoder_alone.verdict
     # faster than all that was fitted, and predicted within what was left open
-    assert assess_fit((), [quality], of_fit=of_fit).sound
+    assert assess_fit(None, [quality], of_fit=of_fit).sound

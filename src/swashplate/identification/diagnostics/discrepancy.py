@@ -419,11 +419,11 @@ class ClassError(NamedTuple):
     """Part of the error that the numbers of the machine leave open in reference motions. [1]"""
 
 
-class FasterError(NamedTuple):
-    """What is left open of a sine that is faster than any test."""
+class BeyondTests(NamedTuple):
+    """What is left open of a motion that is faster than any test."""
 
-    frequency: float
-    """[Hz]"""
+    motion: str
+    """Such as ``"a sine of 0.5 Hz"``."""
     error: float
     """Root mean square that it stays below with nine of ten, over the range. [1]"""
 
@@ -445,8 +445,8 @@ class PredictionError(Result):
 
     of_position: bool = False
     """Whether the channel is a position, of which the speed is judged."""
-    faster: FasterError | None = None
-    """None if the tests are as fast, or nothing is left open."""
+    beyond: tuple[BeyondTests, ...] = ()
+    """Of motions faster than any test; none if the tests are as fast, or nothing is left open."""
 
     @property
     def worst(self) -> ClassError:
@@ -527,7 +527,7 @@ def prediction_errors(
                     _class_errors(cells, coefficients, _open_by_class(of_channel, reach, largest))
                 ),
                 of_position=measured.is_position,
-                faster=_faster(of_channel, reach),
+                beyond=tuple(_beyond_tests(of_channel, reach)),
             )
         )
     return tuple(errors)
@@ -537,8 +537,8 @@ class LeftOpen(NamedTuple):
     """One channel of a motion, and what the numbers of the machine leave open of it."""
 
     record: ChannelErrors
-    faster: float = 0.0
-    """Frequency of a sine that is faster than any test; 0 of any other motion. [Hz]"""
+    beyond: str = ""
+    """The motion in words if it is faster than any test."""
 
 
 def _largest_command(record: ChannelErrors) -> float:
@@ -552,7 +552,7 @@ def _open_by_class(
     """Mean square that is left open of the motions of each class, none faster than the tests."""
     windows = defaultdict[MotionClass, list[Array]](list)
     for part in motions:
-        if part.faster:
+        if part.beyond:
             continue
         for motion, inside in classes_of(part.record, reach, largest).items():
             rows = _rows_of(part.record, WINDOWS[motion], inside)
@@ -563,16 +563,15 @@ def _open_by_class(
     }
 
 
-def _faster(motions: Sequence[LeftOpen], reach: float) -> FasterError | None:
-    """What is left open of the sine that is faster than any test."""
+def _beyond_tests(motions: Sequence[LeftOpen], reach: float) -> Iterator[BeyondTests]:
+    """What is left open of the motions that are faster than any test."""
     for part in motions:
-        if part.faster:
+        if part.beyond:
             everywhere = np.ones(part.record.signal.size, np.bool_)
             rows = _rows_of(part.record, WINDOWS["fast"], everywhere)
             errors = left_open_over(part.record, WINDOWS["fast"], rows) / reach
             square = mean_square_bound(errors, BOUND_LEVEL)
-            return FasterError(part.faster, float(np.sqrt(square)))
-    return None
+            yield BeyondTests(part.beyond, float(np.sqrt(square)))
 
 
 def _class_errors(

@@ -1,8 +1,8 @@
 """Motions by which it is judged what a fit leaves open of a drive, whatever its tests were.
 
-A stair through all commands that the tests had, steps to the largest ones, and a sine as fast as
-the fastest of the tests: what a drive is used for. Beside them a faster sine, which no test needs
-to have and which tells most where the tests are slow.
+A stair through all commands that the tests had, steps as large as theirs, and a sine as fast as the
+fastest of the tests: what a drive is used for. Beside them steps to the largest commands and a
+faster sine, which no test needs to have and which tell most where the tests are slow.
 """
 
 from __future__ import annotations
@@ -25,8 +25,8 @@ from swashplate.machine.marching import SOURCE_RATE
 
 Array = NDArray[np.float64]
 
-LEVELS = 10
-"""Levels of the stair, each way."""
+LEVELS, MOST_LEVELS = 10, 40
+"""Levels of the stair, each way, and of one whose steps are as small as those of the tests."""
 HELD = 1.0
 """Time for which a level of the stair is held; a step three times as long. [s]"""
 PERIODS = 3
@@ -35,6 +35,27 @@ FASTER = 0.5
 """Frequency of the faster sine: an operator who swings the stick. [Hz]"""
 SAMPLED = 64.0
 """Rate at which a reference motion is looked at. [Hz]"""
+ALIKE = 0.95
+"""Part of the largest command from which a step of a test is one to it. [1]"""
+
+
+class Pace(NamedTuple):
+    """How fast the tests of a fit were."""
+
+    sine: float
+    """Highest frequency of a sine; 0 without one. [Hz]"""
+    step: float
+    """Largest change of the command within 0.1 s. [unit of the command]"""
+
+
+def pace_of(runs: Sequence[Experiment], sine: float) -> Pace:
+    """How fast some runs are, of which the frequency of the fastest sine is known [Hz]."""
+    largest = 0.0
+    for run in runs:
+        command = run.input
+        ahead = np.interp(command.time + TIME, command.time, command.values)
+        largest = max(largest, float(np.abs(ahead - command.values).max()))
+    return Pace(sine, largest)
 
 
 class ReferenceMotion(NamedTuple):
@@ -43,25 +64,28 @@ class ReferenceMotion(NamedTuple):
     name: str
     values: Array
     """(n,) samples at `SOURCE_RATE`."""
-    faster: float = 0.0
-    """Frequency of a sine that is faster than any test; 0 of any other. [Hz]"""
+    beyond: str = ""
+    """In words, if it is faster than any test."""
 
 
-def motions_between(low: float, high: float, fastest: float) -> Iterator[ReferenceMotion]:
-    """The motions between two commands, 0 within them, for tests with sines of up to a frequency.
-
-    Without a sine in the tests `fastest` is 0.
-    """
+def motions_between(low: float, high: float, pace: Pace) -> Iterator[ReferenceMotion]:
+    """The motions between two commands, 0 within them, for tests of a pace."""
     low, high = min(low, 0.0), max(high, 0.0)
     ends = [end for end in (high, low) if end != 0.0]
-    up = np.arange(LEVELS + 1) / LEVELS
-    stair = np.concatenate([end * np.concatenate([up, up[-2:0:-1]]) for end in ends])
-    yield ReferenceMotion("stair", _held([*stair, 0.0], HELD))
-    yield ReferenceMotion("steps", _held([0.0, *ends, 0.0], 3.0 * HELD))
-    if fastest > 0.0:
-        yield ReferenceMotion("sine", _sine(low, high, fastest))
-    if fastest < FASTER:
-        yield ReferenceMotion("faster sine", _sine(low, high, FASTER), FASTER)
+    largest = max(high, -low)
+    if pace.step > 0.0:
+        count = int(np.clip(np.ceil(largest / pace.step), LEVELS, MOST_LEVELS))
+        up = np.arange(count + 1) / count
+        stair = np.concatenate([end * np.concatenate([up, up[-2:0:-1]]) for end in ends])
+        yield ReferenceMotion("stair", _held([*stair, 0.0], HELD))
+        steps = [float(np.copysign(min(pace.step, abs(end)), end)) for end in ends]
+        yield ReferenceMotion("steps", _held([0.0, *steps, 0.0], 3.0 * HELD))
+    if pace.sine > 0.0:
+        yield ReferenceMotion("sine", _sine(low, high, pace.sine))
+    if pace.step < ALIKE * largest:
+        yield ReferenceMotion("larger steps", _held([0.0, *ends, 0.0], 3.0 * HELD), "steps")
+    if pace.sine < FASTER:
+        yield ReferenceMotion("faster sine", _sine(low, high, FASTER), f"a sine of {FASTER:g} Hz")
 
 
 def _held(levels: Sequence[float], duration: float) -> Array:
@@ -78,11 +102,12 @@ def _sine(low: float, high: float, frequency: float) -> Array:
 
 
 def motions_left_open(
-    fit: Optimum, posterior: Posterior, fastest: float
+    fit: Optimum, posterior: Posterior, fastest_sine: float
 ) -> Iterator[tuple[ReferenceMotion, str, ChannelErrors]]:
     """What the posterior leaves open of each channel in each reference motion of a drive.
 
-    Nothing of a user-defined model, or of a drive that does not hold under such a command.
+    `fastest_sine` is the highest frequency of a sine among the tests, 0 without one [Hz]. Nothing
+    of a user-defined model, or of a drive that does not hold under such a command.
     """
     if not isinstance(fit.problem.model, DriveModel) or not posterior.names:
         return
@@ -94,7 +119,7 @@ def motions_left_open(
     if low == high == 0.0:
         return
     model = DriveModel(fit.drive.parameters)
-    for motion in motions_between(low, high, fastest):
+    for motion in motions_between(low, high, pace_of(alike, fastest_sine)):
         experiment = _moved(template, motion.values)
         try:
             response = linearised_model(model, {}, experiment, posterior.names)

@@ -192,11 +192,12 @@ class Verdict(Result):
                 sentences += (
                     f" {prediction.signal}: unknown in {listed(unknown)}, as no run has it."
                 )
-            faster = prediction.faster
-            if faster is not None and faster.error > prediction.worst.error:
+            beyond = [part for part in prediction.beyond if part.error > prediction.worst.error]
+            if beyond:
+                known = [f"{percent(part.error)} in {part.motion}" for part in beyond]
                 sentences += (
-                    f" Faster than any test, in a sine of {faster.frequency:g} Hz with the largest "
-                    f"commands, {prediction.signal} is known only within {percent(faster.error)}."
+                    f" Faster than any test {prediction.signal} is known only within "
+                    f"{listed(known)}, with the largest commands."
                 )
         return sentences
 
@@ -345,7 +346,7 @@ def assess_fit(
     if fit is not None and posterior is not None:
         fastest = _fastest_sine(tested)
         for motion, channel, record in motions_left_open(fit, posterior, fastest):
-            motions[channel].append(LeftOpen(record, motion.faster))
+            motions[channel].append(LeftOpen(record, motion.beyond))
     predictions = prediction_errors(fit, predicted, named & held_out, motions)
     decisive = _decisive(predictions, fit, predicted)
     if fit is None:
