@@ -10,7 +10,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from swashplate.documents import parse_toml, read_text
-from swashplate.errors import FileError, InputError, MissingFileError, UnknownParameterError
+from swashplate.errors import (
+    FileError,
+    InputError,
+    MissingFileError,
+    ParameterError,
+    UnknownParameterError,
+)
 from swashplate.units import unit_text
 
 if TYPE_CHECKING:
@@ -234,7 +240,7 @@ def fit_of(word: str, numbers: Mapping[str, float]) -> StoredVerdict | None:
     place = Path(word) if Path(word).is_dir() else Path(word).parent
     try:
         stored = read_verdict(place / FIT_FILE)
-    except FileError:
+    except (FileError, ParameterError):
         # a packaged drive has no fit, and one of another version is no reason against a drive
         return None
     if stored is None or stored.numbers != dict(numbers):

@@ -8,7 +8,7 @@ linearly.
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import NamedTuple
 
@@ -70,11 +70,11 @@ class ArrowFactor:
 
     size: int
     """How many unknowns K there are."""
-    shared: Numbers
+    shared: Numbers = field(repr=False)
     """(M,) numbers of those that all runs share."""
-    runs: Mapping[str, RunFactor]
+    runs: Mapping[str, RunFactor] = field(repr=False)
     """By run, of those that have unknowns of their own."""
-    rest: Array
+    rest: Array = field(repr=False)
     """(<= M, M) triangle of what is left for the shared ones."""
 
     @cached_property

@@ -33,6 +33,10 @@ BETTER = 0.02
 smaller difference moves the ends of an interval by less than 1 % of their distance."""
 CLOSE = 1e-3
 """Relative error in the root of the cost's rise at which a crossing counts as found."""
+CLOSE_ENOUGH = 0.02
+"""The same of an interval's end that is looked for again: of its half width."""
+SETTLED = 0.01
+"""Part of the cost's rise to a threshold by which the others, fitted, need not fall any further."""
 FURTHEST, MOST, HALVINGS = 300.0, 40, 6
 """Largest distance looked at, in first steps; most points a side; and how often a step is halved at
 the edge of the model's domain."""
@@ -68,12 +72,14 @@ def side_of(
     step: float,
     bound: float,
     most: int = MOST,
+    close: float = CLOSE,
 ) -> ProfileSide:
     """Outwards until the cost has risen enough, or something else ends the side.
 
-    `step` is that of about one standard error, negative downwards; `most` points are looked at.
+    `step` is that of about one standard error, negative downwards; `most` points are looked at, and
+    a crossing is found when the root of the cost's rise is as `close`.
     """
-    walk = _Walk(minimise, optimum, index, rise, float(np.sign(step)))
+    walk = _Walk(minimise, optimum, index, rise, float(np.sign(step)), close)
     try:
         ending, distance = walk.outwards(abs(step), abs(bound - optimum.number), most)
     except _BetterOptimumError as error:
@@ -93,6 +99,8 @@ class _Walk:
     """Rise of the cost at which the side ends."""
     sign: float
     """1 upwards, -1 downwards."""
+    close: float = CLOSE
+    """See `CLOSE`."""
     points: list[Point] = field(default_factory=list)
 
     def height(self, distance: float) -> float | None:
@@ -134,7 +142,7 @@ class _Walk:
                 stride *= 0.5
                 continue
             if height >= 1.0:
-                return "crossed", _crossing(self.height, near, low, distance, height)
+                return "crossed", _crossing(self.height, near, low, distance, height, self.close)
             # slowly, so that the next start is good and a flat stretch is not leapt over
             stride *= float(np.clip(STRIDE / max(height - low, 0.1 * STRIDE), 0.3, 2.5))
             near, low = distance, height
@@ -142,13 +150,18 @@ class _Walk:
 
 
 def _crossing(
-    height: Callable[[float], float | None], near: float, low: float, far: float, high: float
+    height: Callable[[float], float | None],
+    near: float,
+    low: float,
+    far: float,
+    high: float,
+    close: float,
 ) -> float:
     """Distance of height 1 between two, by false position (Illinois)."""
     low, high = low - 1.0, high - 1.0
     distance = far
     for _ in range(12):
-        if abs(high) <= CLOSE:
+        if abs(high) <= close:
             break
         distance = far - high * (far - near) / (high - low)
         now = height(distance)
@@ -258,7 +271,6 @@ def checked_ends(
     low, high = problem.bounds
     cost = problem.cost(vector)
     drive = isinstance(problem.model, DriveModel)
-    minimise = minimiser(problem, tolerance=1e-6, max_evaluations=TRIES)
     for index, unknown in enumerate(problem.unknowns):
         if unknown.run is not None:
             continue
@@ -289,7 +301,11 @@ def checked_ends(
             optimum = Point(float(vector[index]), cost, vector)
             least = LEAST_STEP * float(high[index] - low[index])
             step = sign * max(min(float(reach[index]), room), least)
-            side = side_of(minimise, optimum, index, rise, step, float(bound), MOST_POINTS)
+            tolerance = float(np.clip(SETTLED * rise / cost, 1e-8, 1e-4)) if cost > 0.0 else 1e-6
+            minimise = minimiser(problem, tolerance=tolerance, max_evaluations=TRIES)
+            side = side_of(
+                minimise, optimum, index, rise, step, float(bound), MOST_POINTS, CLOSE_ENOUGH
+            )
             distance = np.inf if side.end is None else abs(side.end - optimum.number)
             better = None if side.better is None else side.better.cost
             if not shallow and side.end is None:  # the linearised end holds

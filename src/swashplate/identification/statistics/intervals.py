@@ -500,13 +500,20 @@ def weighed(problem: Problem, vector: Array) -> Problem:
     worth one, data would outweigh a prior a hundred times too much. So a prior counts as often as
     that: by the ratio of its unknown's variance under the noise that the residuals show to its
     variance under the noise that the cost assumes, both from the data alone; by the median of the
-    others if the data alone do not determine the unknown. `vector` (K,) is at or near the
-    optimum; an `InputError` says that there are no more samples than unknowns.
+    others if the data alone tell less of the unknown than its prior, as such a direction is one of
+    next to no residuals. `vector` (K,) is at or near the optimum; an `InputError` says that there
+    are no more samples than unknowns.
     """
     fit = linearised_fit(replace(problem, unknowns=problem.unknowns.with_worths(None)), vector)
     covariance = spectral_covariance(fit)
     assumed = np.sum(fit.whitening**2, axis=1)
-    determined = covariance.determined & (assumed > 0.0)
+    known = [
+        np.inf if unknown.prior is None else unknown.prior.deviation for unknown in problem.unknowns
+    ]
+    logarithmic = [unknown.log for unknown in problem.unknowns]
+    widths = np.array(known) / np.where(logarithmic, 1.0, problem.unknowns.scales)
+    told = np.diag(covariance.matrix) < widths**2
+    determined = covariance.determined & (assumed > 0.0) & told
     ratio = np.diag(covariance.matrix)[determined] / assumed[determined]
     ratios = np.full(determined.size, float(np.median(ratio)) if determined.any() else 1.0)
     ratios[determined] = ratio
