@@ -27,7 +27,6 @@ from swashplate.identification import (
     Unknown,
     Unknowns,
     fit,
-    load_setup,
     uncertainty_of,
 )
 from swashplate.identification.estimation.setup import Free
@@ -38,7 +37,7 @@ VOLTAGE = maneuvers.step(9.0, stop=4.0, length=5.0).sample()
 
 @pytest.fixture
 def given_uncertainty(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Stages of which the Monte Carlo takes an uncertainty that the test gives."""
+    """Of a fit the Monte Carlo takes an uncertainty that the test gives."""
     for module in ("monte_carlo", "propagation"):
         monkeypatch.setattr(
             f"swashplate.analysis.{module}.uncertainty_of", attrgetter("uncertainty")
@@ -55,13 +54,13 @@ def test_draws_outside_the_bounds_are_drawn_again(hoist):
     model = DriveModel(hoist.parameters)
 
     def drawn(variance: float, count: int) -> Draws:
-        """From what the Monte Carlo reads of a stage; Z18 is not determined."""
+        """From what the Monte Carlo reads of a fit; Z18 is not determined."""
         own = SimpleNamespace(matrix=np.diag([variance, 0.0]), determined=np.array([True, False]))
         problem = SimpleNamespace(unknowns=unknowns, model=model, uncertain=())
-        solution, name = SimpleNamespace(vector=unknowns.start), SimpleNamespace(name="pump")
-        known = SimpleNamespace(own=own, earlier_stages=(), systematic={})
-        one = SimpleNamespace(stage=name, problem=problem, solution=solution, uncertainty=known)
-        return drawn_drives([one], count, seed=1)
+        solution = SimpleNamespace(vector=unknowns.start)
+        known = SimpleNamespace(own=own, systematic={})
+        one = SimpleNamespace(problem=problem, solution=solution, uncertainty=known)
+        return drawn_drives(one, count, seed=1)
 
     found = drawn(4e-4, 300)
     assert found.columns["Z10"].min() >= 12.396 * 0.98
@@ -79,26 +78,23 @@ def test_draws_outside_the_bounds_are_drawn_again(hoist):
         drawn(1e10, 10)
     with pytest.raises(InputError, match="draw, .* 0"):
         drawn(1e-4, 0)
-    with pytest.raises(InputError, match="one stage of a fit"):
-        drawn_drives([])
 
 
 @pytest.mark.usefixtures("given_uncertainty")
 def test_no_draws_of_a_pump_that_is_hardly_known_at_its_bound(hoist):
     unknowns = Unknowns((Unknown("Z10", 12.396, 12.396, 24.0),))
     own = SimpleNamespace(matrix=np.diag([1e4]), determined=np.array([True]))
-    stage = SimpleNamespace(
-        stage=SimpleNamespace(name="pump"),
+    hardly_known = SimpleNamespace(
         problem=SimpleNamespace(
             unknowns=unknowns, model=DriveModel(hoist.parameters), uncertain=()
         ),
         solution=SimpleNamespace(vector=unknowns.start),
-        uncertainty=SimpleNamespace(own=own, earlier_stages=(), systematic={}),
+        uncertainty=SimpleNamespace(own=own, systematic={}),
         drive=hoist,
     )
 
     with pytest.raises(InputError, match=r"Of \d+ draws .*Monte Carlo"):
-        drawn_drives([stage], 10)
+        drawn_drives(hardly_known, 10)
 
 
 def pumps(drive: Drive, error: float, count: int) -> Draws:
@@ -134,19 +130,14 @@ def test_a_band_by_hand(hoist):
 
 
 def small_setup() -> FitSetup:
-    """A card's gain and pump's size, two stages: the hoist's fit setup with little that is free.
+    """A card's jump and gain and a pump's size are free.
 
     The angle at the stops, which is fixed, may be off by about as much as the pump's estimate. The
     current has no hysteresis, which would hide how the estimates follow each other.
     """
-    card, pump = load_setup("hoist").stages
-    kept = {name: card.free[name] for name in ("J", "G1")}
-    only_size = {"free": {"Z10": Free(relative=(0.5, 2.0))}, "forces": None}
     return FitSetup(
-        stages=(
-            card.model_copy(update={"free": kept}),
-            pump.model_copy(update={**only_size, "current_hysteresis": 0.0}),
-        ),
+        free=dict.fromkeys(("J", "G1", "Z10"), Free(relative=(0.5, 2.0))),
+        current_hysteresis=0.0,
         standard_uncertainty={"Z13": "0.008 %"},
     )
 
@@ -173,31 +164,26 @@ def test_a_stored_fit_gives_drives_of_its_quoted_errors(fit_and_folder):
     again, other = (stored_draws(fitted, draws=2, seed=seed).columns["Z10"] for seed in (1, 2))
     np.testing.assert_array_equal(again, columns["Z10"][:2])
     assert (other != again).all()
-    for each in result.stages:
-        for estimate in uncertainty_of(each).estimates:
-            if estimate.name in columns:
-                assert estimate.standard_error is not None
-                # 400 draws are good to 4/√800 of a standard error
-                assert columns[estimate.name].std() == pytest.approx(
-                    estimate.standard_error, rel=0.15
-                )
-                assert columns[estimate.name].mean() == pytest.approx(
-                    estimate.value, abs=0.25 * estimate.standard_error
-                )
+    known = uncertainty_of(result)
+    for estimate in known.estimates:
+        if estimate.name in columns:
+            assert estimate.standard_error is not None
+            # 400 draws are good to 4/√800 of a standard error
+            assert columns[estimate.name].std() == pytest.approx(estimate.standard_error, rel=0.15)
+            assert columns[estimate.name].mean() == pytest.approx(
+                estimate.value, abs=0.25 * estimate.standard_error
+            )
     stop = columns["Z13_plus"]  # drawn as it was stated, and the pump follows it
     assert stop.std() == pytest.approx(8e-5 * result.drive["Z13"].value.plus, rel=0.15)
     assert np.corrcoef(columns["Z10"], stop)[0, 1] < -0.5
-    # what the card's stage does not know moves the pump along, by the slopes that are quoted
-    card, pump = result.stages
-    (earlier_stages,) = uncertainty_of(pump).earlier_stages
-    joint = earlier_stages.slopes @ earlier_stages.covariance.matrix
-    spread = np.outer(
-        uncertainty_of(pump).quoted.standard_errors, earlier_stages.covariance.standard_errors
-    )
-    names = card.problem.unknowns.names
-    drawn_correlations = [np.corrcoef(columns["Z10"], columns[name])[0, 1] for name in names]
-    np.testing.assert_allclose(drawn_correlations, (joint / spread)[0], atol=0.12)
-    assert np.abs((joint / spread)[0]).max() > 0.25  # more than 400 draws would show by chance
+    # errors go together as they are quoted
+    names = ["J_plus", "J_minus", "G1_plus", "G1_minus", "Z10"]
+    places = [known.own.variables.index(name) for name in names]
+    quoted = known.quoted.correlation[np.ix_(places, places)]
+    drawn_correlations = np.corrcoef([columns[name] for name in names])
+    np.testing.assert_allclose(drawn_correlations, quoted, atol=0.12)
+    # more than 400 draws would show by chance
+    assert np.abs(quoted[-1, :-1]).max() > 0.25
 
 
 @pytest.mark.slow

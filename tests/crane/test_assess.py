@@ -31,7 +31,7 @@ from swashplate.crane.studies.run_outcome import STOPPED
 from swashplate.drive import Limit
 from swashplate.errors import InputError, ParameterError
 from swashplate.executors import Processes, Serial, Threads
-from swashplate.identification import FitSetup, Identification, fit, load_setup
+from swashplate.identification import FitSetup, Identification, fit
 from swashplate.identification.estimation.setup import Free
 from swashplate.maneuvers import source_tests
 
@@ -485,9 +485,7 @@ def fitted(tmp_path_factory):
     virtual = rig.run("luff", {name: source_tests("luff")[name] for name in names}, seed=3)
     path = rig.write(virtual, place / "virtual")
     campaign = Campaign.from_toml(path)
-    (stage,) = (each for each in load_setup("luff").stages if each.name == "pump")
-    free = {"Z16": Free(relative=(0.5, 2.0))}
-    setup = FitSetup(stages=(stage.model_copy(update={"free": free, "forces": None}),))
+    setup = FitSetup(part="pump", free={"Z16": Free(relative=(0.5, 2.0))})
     result = fit(Drive.preset("luff").parameters, campaign.experiments, setup)
     identified = Identification(campaign, result)
     identified.save(place)

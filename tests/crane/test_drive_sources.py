@@ -19,9 +19,10 @@ from swashplate.crane import (
     simulate,
     with_design_change,
 )
-from swashplate.identification import Verdict, load_setup
-from swashplate.identification.assessment import FitFile, StoredStage, StoredVerdict
+from swashplate.identification import FitSetup, Verdict
+from swashplate.identification.assessment import FitFile, StoredVerdict
 from swashplate.identification.diagnostics.discrepancy import ClassError, PredictionError
+from swashplate.identification.estimation.setup import Free
 from swashplate.identification.estimation.solving import Solution
 from swashplate.report.scene import write_assessment, write_scene
 
@@ -34,8 +35,7 @@ NONE_KNOWN = "has none: fit again"
 SOLUTION = Solution(
     vector=np.zeros(0), cost=0.0, evaluations=1, converged=True, interrupted=False, message=""
 )
-STAGE = StoredStage(name="pump", unknowns=(), solution=SOLUTION, starts=())
-"""A fit has a stage; of this one only the verdict is read."""
+"""Of this fit only the verdict is read."""
 SHORT = {"length": 60.0, "run_in": 0.0, "remedies": False, "tipping_points": False}
 VALIDITY = "Holds for steps from -9 to 9 V; never reached: the swash plate's stop Z13."
 UNREACHED = (
@@ -77,10 +77,11 @@ def fit(tmp_path):
             campaign="campaign.toml",
             runs={"step": ""},
             nominal="",
-            setup=load_setup("hoist"),
-            stages=(STAGE,),
+            setup=FitSetup(part="pump", free={"Z8": Free(relative=(0.5, 2.0))}),
+            unknowns=(),
+            solution=SOLUTION,
+            starts=(),
             profiles=(),
-            folds=None,
             notes={},
             verdict=verdict,
         )

@@ -19,7 +19,7 @@ from swashplate.drafting import (
     guessed_fit_setup,
     guessed_set,
 )
-from swashplate.identification import FitSetup, Stage, fit, load_setup
+from swashplate.identification import FitSetup, fit, whole_drive
 from swashplate.identification.estimation.setup import Free
 
 RATE = 200.0
@@ -140,16 +140,15 @@ def winch() -> tuple[Drive, list[Experiment]]:
 
 
 @pytest.mark.slow
-def test_a_measured_current_gives_a_stage_of_its_own(winch) -> None:
+def test_a_measured_current_frees_the_amplifier_beside_the_pump(winch) -> None:
     _, tests = winch
     found = guess_drive(tests)
     start = guessed_set(found, "campaign.toml")
     setup = FitSetup(**tomllib.loads(guessed_fit_setup(found, start)))
-    amplifier, pump = setup.stages
-    assert (amplifier.part, pump.part) == ("card", "pump")
-    assert {"V_dz_plus", "J_minus", "G1_plus", "omega", "lim1", "tau"} <= amplifier.free.keys()
-    assert {"Z17", "Z19_plus", "Z8"} <= pump.free.keys()
-    assert not amplifier.free.keys() & pump.free.keys()
+    assert setup.part == "chain"
+    assert not setup.channels  # the current is fitted, too
+    assert {"V_dz_plus", "J_minus", "G1_plus", "omega", "lim1", "tau"} <= setup.free.keys()
+    assert {"Z17", "Z19_plus", "Z8"} <= setup.free.keys()
     # steady speeds are those that were guessed from the command to the speed
     steady = Drive(start).steady_speed([-6.0, 6.0])
     for way, speed in enumerate((steady[1], -steady[0])):
@@ -167,27 +166,29 @@ def test_current_and_speed_are_fitted_from_nothing(winch) -> None:
     truth = drive.parameters.numbers
     for name in ("V_dz_plus", "V_dz_minus", "J_plus", "J_minus", "tau", "omega_plus", "lim2_plus"):
         assert result.parameters.numbers[name] == pytest.approx(truth[name], rel=0.05), name
-    amplifier, pump = result.stages
-    assert max(each.measures.rmse for each in amplifier.runs) < 1.1 * 0.005
-    assert max(each.measures.nrmse for each in pump.runs) < 0.05
+    errors = {
+        name: [each.measures for each in result.qualities if each.channel == name]
+        for name in ("rectified_current", "shaft_speed")
+    }
+    assert max(each.rmse for each in errors["rectified_current"]) < 1.1 * 0.005
+    assert max(each.nrmse for each in errors["shaft_speed"]) < 0.05
     assert not result.doubts
 
 
 @pytest.mark.slow
-def test_a_current_that_no_stage_fits_is_named_with_what_does(winch) -> None:
+def test_a_current_that_is_not_fitted_is_named_with_what_does(winch) -> None:
     _, tests = winch
     found = guess_drive([each for each in tests if each.name != "sine"])
     found = found._replace(amplifier=None)
     start = guessed_set(found, "campaign.toml")
     chain = FitSetup(**tomllib.loads(guessed_fit_setup(found, start)))
     doubts = fit(start, tests, chain, max_evaluations=1).doubts
-    (said,) = [each for each in doubts if "no stage fits" in each]
-    assert "'rectified_current'" in said
-    assert "'swashplate guess'" in said
-    assert "--setup" in said
+    (said,) = [each for each in doubts if "leaves it out" in each]
+    assert "'rectified_current' is measured" in said
+    assert "leave out --setup" in said
     hoist = Drive.preset("hoist")
-    doubts = fit(hoist, tests, load_setup("hoist"), max_evaluations=1).doubts
-    assert not [each for each in doubts if "no stage fits" in each]
+    doubts = fit(hoist, tests, whole_drive(hoist.parameters), max_evaluations=1).doubts
+    assert not [each for each in doubts if "leaves it out" in each]
 
 
 def test_a_gross_spike_of_the_current_is_refused_with_the_line_that_leaves_it_out(winch) -> None:
@@ -206,8 +207,8 @@ def test_parameters_without_a_value_are_named_with_what_to_do(winch) -> None:
     """No test of the winch opens the relief valve."""
     _, tests = winch
     free = {"Z10": Free(relative=(0.5, 2.0)), "Z15": Free(relative=(0.9, 1.1))}
-    stage = Stage(name="pump", part="pump", channels=("shaft_speed",), free=free)
-    found = fit(Drive.preset("hoist"), tests[2:4], FitSetup(stages=(stage,)))
+    setup = FitSetup(part="pump", channels=("shaft_speed",), free=free)
+    found = fit(Drive.preset("hoist"), tests[2:4], setup)
     (said,) = [each for each in found.sentences if each.startswith("Not estimated")]
     assert "Z15" in said
     assert "Z10" not in said

@@ -291,8 +291,7 @@ def test_a_guess_becomes_a_drive_and_a_fit_configuration() -> None:
     assert reached == pytest.approx(DELAY + LAG + 2.0 / 512.0, rel=0.1)
     assert {parameters[name].status for name in ("V_dz", "G1", "Z8", "tau")} == {"approximate"}
     setup = FitSetup(**tomllib.loads(guessed_fit_setup(found, parameters)))
-    (stage,) = setup.stages
-    assert {"V_dz_plus", "G1_minus", "Z8", "tau", "Z13_plus", "Z16_minus"} <= stage.free.keys()
+    assert {"V_dz_plus", "G1_minus", "Z8", "tau", "Z13_plus", "Z16_minus"} <= setup.free.keys()
     faster = found._replace(gain=(4e9, 6e9), top_speed=(2e10, 2e10))
     with pytest.raises(ParameterError, match="from campaign.toml .* units and scales .* Z10 "):
         guessed_set(faster, "campaign.toml")
@@ -337,8 +336,7 @@ def test_a_creep_at_rest_is_found(
     start = guessed_set(found, "campaign.toml")
     assert float(Drive(start).steady_speed(0.0)) == pytest.approx(found.creep, rel=1e-6)
     assert start["Z18"].status == "approximate"
-    (stage,) = FitSetup(**tomllib.loads(guessed_fit_setup(found, start))).stages
-    low, high = stage.free["Z18"].bounds
+    low, high = FitSetup(**tomllib.loads(guessed_fit_setup(found, start))).free["Z18"].bounds
     assert low < start.numbers["Z18"] < high
 
 
@@ -363,7 +361,7 @@ def test_no_creep_is_made_of_noise_or_counts(
     assert start.numbers["Z18"] == 0.0
     text = guessed_fit_setup(found, start)
     assert "no creep" in text
-    assert "Z18" not in tomllib.loads(text)["stages"][0]["free"]
+    assert "Z18" not in tomllib.loads(text)["free"]
 
 
 @pytest.mark.slow
@@ -373,7 +371,7 @@ def test_without_a_rest_no_creep_is_told() -> None:
     assert found.creep is None
     text = guessed_fit_setup(found, guessed_set(found, "campaign.toml"))
     assert "rest" in text
-    assert "Z18" not in tomllib.loads(text)["stages"][0]["free"]
+    assert "Z18" not in tomllib.loads(text)["free"]
 
 
 def test_what_tells_nothing_is_refused() -> None:

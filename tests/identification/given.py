@@ -149,14 +149,71 @@ def put(pattern: str, new: str, count: int = 0) -> Callable[[str], str]:
 
 
 LATER = {"from": 1.0, "to": 1.2, "factor": 10.0}
-CARD = {"free": {"J": {"relative": (0.5, 2.0)}}, "weights": {"rectified_current": [LATER]}}
 KNOWN = {"relative": (0.8, 1.25), "log": True, "prior": {"mean": 12.8, "deviation": 0.05}}
-TWO_STAGES = FitSetup.model_validate(
+FEW = FitSetup.model_validate(
     {
-        "title": "two stages",
-        "stages": [
-            {"name": "card", "part": "card", **CARD},
-            {"name": "pump", "part": "pump", "free": {"Z10": KNOWN}},
-        ],
+        "title": "few numbers",
+        "part": "chain",
+        "free": {"J": {"relative": (0.5, 2.0)}, "Z10": KNOWN},
+        "weights": {"rectified_current": [LATER]},
     }
 )
+"""A jump of the card and a number of the pump, through the whole chain."""
+
+
+WIDE = {"relative": (0.5, 2.0)}
+POSITIVE = WIDE | {"log": True}
+LARGER = {"relative": (0.8, 2.0), "log": True}
+BEND = {"relative": (-5.0, 5.0)}
+DEAD_ZONE = {"relative": (0.85, 1.15)}
+CARDS: Mapping[str, Mapping[str, Mapping[str, object]]] = {
+    "hoist": dict.fromkeys(("V_dz", "J", "G1"), WIDE)
+    | dict.fromkeys(("G2", "G3"), BEND)
+    | dict.fromkeys(("zeta", "omega", "lim1", "lim2"), POSITIVE)
+    | {"I_t1": WIDE, "a": POSITIVE},
+    "slew": dict.fromkeys(("V_dz", "J", "G1"), WIDE)
+    | dict.fromkeys(("zeta_plus", "omega_plus", "C_plus", "lim2_plus", "a"), POSITIVE),
+    "luff": dict.fromkeys(("V_dz", "J", "G1"), WIDE)
+    | dict.fromkeys(("zeta_plus", "omega_plus", "C_plus"), POSITIVE)
+    | dict.fromkeys(("lim1_plus", "lim2_plus", "a"), POSITIVE),
+}
+"""What Kruse's tests determine of the cards: downwards a slew and a luff have sines alone."""
+PUMPS: Mapping[str, Mapping[str, Mapping[str, object]]] = {
+    "hoist": dict.fromkeys(("Z1", "Z3", "Z8", "Z16_plus"), LARGER)
+    | {
+        "Z10": {"relative": (0.88, 1.14), "log": True},
+        "Z13_plus": {"relative": (0.8, 1.4), "log": True},
+        "Z13_minus": {"relative": (0.3, 3.0), "log": True},
+        "Z16_minus": {"relative": (0.5, 10.0), "log": True},
+        "Z17": DEAD_ZONE,
+    },
+    "slew": {
+        "Z8": POSITIVE,
+        "Z13": POSITIVE,
+        "Z17": DEAD_ZONE,
+        "Z19": POSITIVE,
+        "Z21": {"bounds": (-20.0, 20.0)},
+    },
+    "luff": {
+        "Z8": POSITIVE,
+        "Z16": {"relative": (0.5, 3.0), "log": True},
+        "Z17": DEAD_ZONE,
+        "Z19": POSITIVE,
+    },
+}
+"""And of pump and motor: Z4 to Z6 and Z9 are scales that no speed tells. Without a spool offset the
+arm ratio Z3 and the forces can hardly be told apart, nor Z10 and the angles, nor Z1 and Z8."""
+FORCES = {
+    "plus": (0.06, 0.16, 0.28, 0.40),
+    "minus": (0.06, 0.16, 0.28, 0.38),
+    "relative": (0.8, 2.0),
+}
+"""Of the hoist's solenoids: beyond the dead zone, up to the speed's saturation."""
+
+
+def determined_of(axis: str, part: str = "chain", **entries: object) -> FitSetup:
+    """A fit setup of what Kruse's tests determine of an axis: of its card, its pump or both."""
+    free = {**(CARDS[axis] if part != "pump" else {}), **(PUMPS[axis] if part != "card" else {})}
+    forces = FORCES if axis == "hoist" and part != "card" else None
+    content = {"part": part, "free": free, "forces": forces, **entries}
+    return FitSetup.model_validate(content)

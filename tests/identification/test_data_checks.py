@@ -9,7 +9,7 @@ from tests.identification.given import run_of, virtual
 
 from swashplate import Campaign, Drive, Experiment, InputError, maneuvers
 from swashplate.drafting import guess_drive
-from swashplate.identification import FitSetup, Stage, fit
+from swashplate.identification import FitSetup, fit
 from swashplate.identification.diagnostics import check_runs, refuse_unsound
 from swashplate.identification.diagnostics.data_checks import Finding
 from swashplate.identification.estimation import smooth
@@ -20,8 +20,7 @@ TRUTH = Drive(NOMINAL).scale(Z10=1.1)
 
 
 def pump(*names: str) -> FitSetup:
-    free = dict.fromkeys(names, Free(relative=(0.5, 2.0)))
-    return FitSetup(stages=(Stage(name="pump", part="pump", free=free),))
+    return FitSetup(part="pump", free=dict.fromkeys(names, Free(relative=(0.5, 2.0))))
 
 
 PUMP = pump("Z8", "Z10")

@@ -147,7 +147,7 @@ def qualities(errors: Sequence[np.ndarray], noise: float | None = None) -> list[
 
 
 def stated(runs: Sequence[RunQuality]) -> PredictionError:
-    (found,) = prediction_errors((), runs)
+    (found,) = prediction_errors(None, runs)
     return found
 
 
@@ -189,7 +189,7 @@ def test_white_noise_is_not_an_error_of_the_model() -> None:
 
 def test_a_channel_that_never_moves_has_no_error_to_state() -> None:
     still = compared(bench_run("still", 1.0, np.zeros(TIME.size)), "y", np.zeros(TIME.size))
-    assert prediction_errors((), [still]) == ()
+    assert prediction_errors(None, [still]) == ()
     short = bench_run("short", 1.0, np.zeros(TIME.size), weight=0.0)
     assert (
         channel_errors(compared(bench_run("a", 1.0, np.sin(TIME)), "y", np.sin(TIME))) is not None

@@ -6,12 +6,12 @@ from math import sqrt
 
 import numpy as np
 import pytest
-from tests.identification.given import run_of, virtual
+from tests.identification.given import determined_of, run_of, virtual
 from tests.identification.test_own_model import FREE, OWN, TRUTH, trial, valve
 
 from swashplate import Campaign, Drive, Experiment, ParameterError
 from swashplate.campaign import Accuracy, resolution_of_inputs
-from swashplate.identification import ModelSetup, StageFit, estimates_of, fit, uncertainty_of
+from swashplate.identification import ModelSetup, Optimum, estimates_of, fit, uncertainty_of
 from swashplate.identification.statistics.effects import after_play, changes_of
 from swashplate.machine import Machine, simulate
 from swashplate.maneuvers import source_tests
@@ -126,8 +126,8 @@ def stated(run: Experiment) -> Experiment:
 
 def test_estimates_follow_each_effect_as_a_fit_of_changed_runs_does() -> None:
     runs = [stated(trial("a")), stated(trial("b"))]
-    stage = fit(SETUP, runs).stages[0]
-    systematic, middle = uncertainty_of(stage).systematic, stage.solution.vector
+    found = fit(SETUP, runs)
+    systematic, middle = uncertainty_of(found).systematic, found.solution.vector
     changed: dict[str, list[Experiment]] = {}
     for number, run in enumerate(runs):
         for effect, experiment, part in changes_of(run, 0.0):
@@ -138,7 +138,7 @@ def test_estimates_follow_each_effect_as_a_fit_of_changed_runs_does() -> None:
     for effect, experiments in changed.items():
         # the command's zero is moved by a part of its uncertainty
         part = 0.02 if effect.startswith("zero") else 1.0
-        moved = fit(SETUP, experiments).stages[0].solution.vector
+        moved = fit(SETUP, experiments).solution.vector
         expected = (moved - middle) / part
         size = max(np.abs(expected).max(), 1e-6)
         assert systematic[effect] == pytest.approx(expected, abs=0.1 * size)
@@ -146,7 +146,7 @@ def test_estimates_follow_each_effect_as_a_fit_of_changed_runs_does() -> None:
 
 def test_variances_of_effects_add_up_and_the_largest_is_named() -> None:
     runs = [stated(trial("a")), stated(trial("b"))]
-    known = uncertainty_of(fit(SETUP, runs).stages[0])
+    known = uncertainty_of(fit(SETUP, runs))
     added = sum(change**2 for change in known.systematic.values())
     assert np.diag(known.quoted.matrix) == pytest.approx(np.diag(known.own.matrix) + added)
     gain = known.own.variables.names.index("gain")
@@ -177,19 +177,14 @@ def test_a_hysteresis_of_the_current_goes_into_the_pump_alone(tmp_path) -> None:
     campaign = virtual(tmp_path, "slew", {name: tests[name] for name in names}, seed=3)
     drive, effect = Drive.preset("slew"), "hysteresis of the current"
 
-    def of_pump(width: float, drive: Drive = drive) -> StageFit:
-        from swashplate.identification import load_setup
+    def of_part(part: str, width: float, drive: Drive = drive) -> Optimum:
+        return fit(drive, campaign, determined_of("slew", part, current_hysteresis=width))
 
-        setup = load_setup("slew")
-        stages = [stage.model_copy(update={"current_hysteresis": width}) for stage in setup.stages]
-        card, pump = fit(drive, campaign, setup.model_copy(update={"stages": tuple(stages)})).stages
-        assert effect not in uncertainty_of(card).systematic
-        return pump
-
-    none, one, two = (of_pump(width) for width in (0.0, 1e-4, 2e-4))
+    assert effect not in uncertainty_of(of_part("card", 1e-4)).systematic
+    none, one, two = (of_part("pump", width) for width in (0.0, 1e-4, 2e-4))
     assert effect not in uncertainty_of(none).systematic
     # one that the drive has is no error of the model
-    rough = of_pump(1e-4, drive.replace(solenoid_hysteresis=1e-4))
+    rough = of_part("pump", 1e-4, drive.replace(solenoid_hysteresis=1e-4))
     assert effect not in uncertainty_of(rough).systematic
     single, double = (uncertainty_of(pump).systematic[effect] for pump in (one, two))
     z8 = one.problem.unknowns.names.index("Z8")
@@ -218,26 +213,24 @@ def scaled_runs(random: np.random.Generator, count: int, deviation: float) -> li
 
 
 def estimated(
-    count: int, deviation: float, repeats: int, seed: int, told: Callable[[StageFit], float]
+    count: int, deviation: float, repeats: int, seed: int, told: Callable[[Optimum], float]
 ) -> list[float]:
     random = np.random.default_rng(seed)
-    return [
-        told(fit(SETUP, scaled_runs(random, count, deviation)).stages[0]) for _ in range(repeats)
-    ]
+    return [told(fit(SETUP, scaled_runs(random, count, deviation))) for _ in range(repeats)]
 
 
 @pytest.mark.slow
 def test_the_scale_of_runs_is_found_and_intervals_hold() -> None:
     """Gains that differ by 2 % from run to run: the mean of eight is known to 0.7 %."""
 
-    def deviation(stage: StageFit) -> float:
-        runs = uncertainty_of(stage).runs
+    def deviation(found: Optimum) -> float:
+        runs = uncertainty_of(found).runs
         return 0.0 if runs is None else runs.deviation
 
     assert np.median(estimated(8, 0.02, 20, 1, deviation)) == pytest.approx(0.02, rel=0.25)
 
-    def holds(stage: StageFit) -> float:
-        gain = next(each for each in estimates_of(stage) if each.name == "gain")
+    def holds(found: Optimum) -> float:
+        gain = next(each for each in estimates_of(found) if each.name == "gain")
         return float(gain.lower <= TRUTH.gain <= gain.upper)
 
     assert np.mean(estimated(8, 0.02, 60, 2, holds)) >= 0.88
@@ -247,8 +240,8 @@ def test_the_scale_of_runs_is_found_and_intervals_hold() -> None:
 
 @pytest.mark.slow
 def test_runs_that_do_not_differ_are_not_said_to() -> None:
-    def deviation(stage: StageFit) -> float:
-        runs = uncertainty_of(stage).runs
+    def deviation(found: Optimum) -> float:
+        runs = uncertainty_of(found).runs
         return 0.0 if runs is None else runs.deviation
 
     assert max(estimated(8, 0.0, 10, 4, deviation)) < 0.002

@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import pytest
-from tests.identification.given import TWO_STAGES, virtual
+from tests.identification.given import FEW, FORCES, determined_of, virtual
 
 import swashplate
 from swashplate import (
@@ -46,8 +46,8 @@ def campaign(tmp_path_factory: pytest.TempPathFactory) -> Campaign:
 
 @pytest.fixture(scope="module")
 def result(campaign: Campaign) -> Identification:
-    """Of two stages, the card's and the pump's."""
-    return swashplate.identify(campaign, free=TWO_STAGES)
+    """Of a number of the card and one of the pump."""
+    return swashplate.identify(campaign, free=FEW)
 
 
 def test_the_campaigns_stick_travels_with_the_drive(result: Identification, tmp_path: Path) -> None:
@@ -137,7 +137,7 @@ def test_a_folder_comes_back_with_the_same_interface(
     names = ["drive.toml", "setup.toml", "estimates.csv", "fit.json"]
     assert [file.name for file in files] == names
     assert all(file.is_file() for file in files)
-    assert load_setup(tmp_path / "fitted" / "setup.toml") == TWO_STAGES
+    assert load_setup(tmp_path / "fitted" / "setup.toml") == FEW
     for place in (tmp_path / "fitted", str(tmp_path / "fitted"), files[-1], files[0]):
         again = Identification.load(place)
         assert again["Z10"] == result["Z10"]
@@ -166,16 +166,24 @@ def estimates(result: Identification) -> Mapping[str, float]:
 
 
 def configured(path: Path) -> Path:
-    path.write_text(setup_text(TWO_STAGES), "utf-8")
+    path.write_text(setup_text(FEW), "utf-8")
     return path
+
+
+def in_stages() -> dict[str, Any]:
+    """`FEW` as it was written while a fit had stages."""
+    content = FEW.model_dump(exclude_defaults=True)
+    title = content.pop("title")
+    return {"title": title, "stages": [{"name": "few", "part": "chain", **content}]}
 
 
 FORMS: Mapping[str, Callable[[Campaign, Path], tuple[Any, Any, Any]]] = {
     "paths": lambda tests, folder: (tests.path, None, configured(folder / "mine.toml")),
     "texts": lambda tests, folder: (str(tests.path), "hoist", str(configured(folder / "x.toml"))),
-    "a drive": lambda tests, _: (tests, Drive.preset("hoist"), TWO_STAGES),
-    "a set": lambda tests, _: (tests, Drive.preset("hoist").parameters, TWO_STAGES),
-    "a file's contents": lambda tests, _: (tests, None, TWO_STAGES.model_dump()),
+    "a drive": lambda tests, _: (tests, Drive.preset("hoist"), FEW),
+    "a set": lambda tests, _: (tests, Drive.preset("hoist").parameters, FEW),
+    "a file's contents": lambda tests, _: (tests, None, FEW.model_dump()),
+    "those of an earlier version": lambda tests, _: (tests, None, in_stages()),
 }
 
 
@@ -183,7 +191,7 @@ FORMS: Mapping[str, Callable[[Campaign, Path], tuple[Any, Any, Any]]] = {
 def test_each_form_of_the_arguments_is_the_same(form, result, campaign, tmp_path) -> None:
     tests, model, free = form(campaign, tmp_path)
     again = swashplate.identify(tests, model, free)
-    assert again.fit.setup == TWO_STAGES
+    assert again.fit.setup == FEW
     assert estimates(again) == estimates(result)
 
 
@@ -192,7 +200,6 @@ def test_drive_and_configuration_come_from_the_campaign(campaign: Campaign) -> N
     found = swashplate.identify(campaign.path)
     assert found.fit.setup == whole_drive(Drive.preset("hoist").parameters)
     assert found.fit.nominal.name == "hoist"
-    assert swashplate.identify(campaign, free="hoist").fit.setup == load_setup("hoist")
 
 
 PARTS: Mapping[str, tuple[Mapping[str, Any], str]] = {
@@ -206,9 +213,8 @@ PARTS: Mapping[str, tuple[Mapping[str, Any], str]] = {
 @pytest.mark.parametrize(("free", "part"), PARTS.values(), ids=PARTS)
 def test_a_mapping_names_what_is_free(campaign: Campaign, free, part: str) -> None:
     found = swashplate.identify(campaign, free=free)
-    (stage,) = found.fit.stages
-    assert stage.stage.part == part
-    machine = {each.name: each for each in stage.problem.unknowns if each.run is None}
+    assert found.fit.setup.part == part
+    machine = {each.name: each for each in found.fit.problem.unknowns if each.run is None}
     symbols = {name.removesuffix("_plus").removesuffix("_minus") for name in machine}
     assert symbols == {name.removesuffix("_plus") for name in free}
     for name, entry in free.items():
@@ -228,10 +234,6 @@ def test_a_tied_parameter_has_its_estimate_by_every_name(campaign: Campaign) -> 
     assert found["J"].free
 
 
-def stage_of(name: str) -> Mapping[str, Any]:
-    return {"name": "pump", "part": "pump", "free": {name: {"relative": [0.5, 2.0]}}}
-
-
 def with_drive(campaign: Campaign, name: str) -> Campaign:
     axis = campaign.axes["hoist"].model_copy(update={"drive": name})
     return replace(campaign, axes={"hoist": axis})
@@ -243,11 +245,9 @@ def two_axes(campaign: Campaign) -> Campaign:
 
 def pump(**entries: object) -> dict[str, object]:
     """A fit setup of the pump alone."""
-    stage = {"name": "pump", "part": "pump", "free": {"Z8": {"relative": (0.5, 2.0)}}}
-    return {"stages": [stage | entries]}
+    return {"part": "pump", "free": {"Z8": {"relative": (0.5, 2.0)}}} | entries
 
 
-FORCES = {"plus": (0.06, 0.16, 0.28, 0.40), "minus": (0.06, 0.16, 0.28, 0.38)}
 REFUSED: Mapping[str, tuple[Callable[[Campaign], object], type[Exception], str]] = {
     "another axis": (
         lambda tests: swashplate.identify(tests, axis="slew"),
@@ -322,7 +322,7 @@ REFUSED: Mapping[str, tuple[Callable[[Campaign], object], type[Exception], str]]
     "an unknown fit setup": (
         lambda tests: swashplate.identify(tests, free="hoost"),
         ParameterError,
-        "fit setup 'hoost' .* hoist",
+        r"'hoost' is no fit setup: give a \.toml file",
     ),
     "an unknown drive": (
         lambda tests: swashplate.identify(tests, "hoost"),
@@ -359,15 +359,18 @@ REFUSED: Mapping[str, tuple[Callable[[Campaign], object], type[Exception], str]]
         InputError,
         "required .* 0.0, .* above 0",
     ),
-    "an unknown parameter of a stage": (
-        lambda tests: swashplate.identify(tests, free={"stages": [stage_of("Z88")]}),
+    "several stages": (
+        lambda tests: swashplate.identify(tests, free={"stages": [pump(), pump()]}),
+        ParameterError,
+        "no stages any more: .* one after another, each --from",
+    ),
+    "an unknown parameter of a fit setup": (
+        lambda tests: swashplate.identify(tests, free=pump(free={"Z88": {"relative": (0.5, 2.0)}})),
         KeyError,
-        "stage 'pump', free: .*'Z88'.* Z8",
+        "fit setup, free: .*'Z88'.* Z8",
     ),
     "an unknown parameter that is uncertain": (
-        lambda tests: swashplate.identify(
-            tests, free={"stages": [stage_of("Z8")], "standard_uncertainty": {"Z99": 1.0}}
-        ),
+        lambda tests: swashplate.identify(tests, free=pump(standard_uncertainty={"Z99": 1.0})),
         KeyError,
         "standard_uncertainty: .*'Z99'.* Z9",
     ),
@@ -436,7 +439,7 @@ def test_runs_that_no_drive_fits_are_refused_after_a_few_evaluations(tmp_path: P
     tests = virtual(tmp_path, "hoist", SINES)
     strange = spoiled(tests, "counts", lambda own, other: other)
     iterations = []
-    with pytest.raises(InputError, match=r"pump .* 7 starts .* \d+ % .*counts"):
+    with pytest.raises(InputError, match=r"best of 7 starts explains \d+ % .*counts"):
         fit(Drive.preset("hoist"), strange, PUMP, watch=lambda *now: iterations.append(now))
     assert len(iterations) <= 31  # of the first search
     # whoever asks for it gets the search to its end, and a verdict
@@ -449,10 +452,9 @@ def test_a_gross_fault_that_leaves_something_to_see_is_fitted(tmp_path: Path) ->
     tests = virtual(tmp_path, "hoist", SINES)
     largest = max(float(run["current"].values.max()) for run in tests)
     clipped = spoiled(tests, "current", lambda own, other: np.minimum(own, 0.5 * largest))
-    setup = load_setup("hoist")
-    card = setup.model_copy(update={"stages": setup.stages[:1]})
+    card = determined_of("hoist", "card")
     found = fit(Drive.preset("hoist"), clipped, card, max_evaluations=70)
-    assert found.stages[0].solution.evaluations > 30
+    assert found.solution.evaluations > 30
 
 
 @pytest.mark.slow
@@ -463,18 +465,14 @@ def test_more_than_a_fit_is_asked_for_by_keywords(
     found = swashplate.identify(
         campaign,
         free={"Z10": (0.5, 2.0)},
-        folds=2,
         profiles=["Z10"],
         starts=2,
         seed=3,
     )
-    assert found.folds is not None
-    assert len(found.folds.folds) == 2
     assert [profile.name for profile in found.profiles] == ["Z10"]
-    assert len(found.fit.stages[0].starts) == 3
+    assert len(found.fit.starts) == 3
     assert found.notes["seed"] == "3"
-    for done in ("3 of 3 starts", "2 of 2 folds"):
-        assert any(done in message for message in caplog.messages)
+    assert any("3 of 3 starts" in message for message in caplog.messages)
 
 
 def test_after_an_interruption_nothing_else_is_computed(
@@ -489,11 +487,10 @@ def test_after_an_interruption_nothing_else_is_computed(
     logger = logging.getLogger("swashplate")
     logger.addFilter(press_ctrl_c)
     try:
-        found = swashplate.identify(campaign, free={"Z10": (0.5, 2.0)}, folds=2, profiles="all")
+        found = swashplate.identify(campaign, free={"Z10": (0.5, 2.0)}, profiles="all")
     finally:
         logger.removeFilter(press_ctrl_c)
     assert found.fit.interrupted
-    assert found.folds is None
     assert not found.profiles
 
 

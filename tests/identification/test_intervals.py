@@ -8,6 +8,7 @@ from scipy.optimize import brentq, least_squares
 from tests.identification.given import (
     TIME,
     bench_run,
+    determined_of,
     first_order,
     linear_fit,
     model_of,
@@ -37,12 +38,11 @@ from swashplate.identification.estimation.setup import setup_text
 from swashplate.identification.noise import Covariance
 from swashplate.identification.statistics.interval_ends import checked_ends
 from swashplate.identification.statistics.intervals import (
-    EarlierStage,
     estimates,
     prior_sentences,
     reach,
     weighed,
-    with_earlier_stages,
+    with_effects,
 )
 from swashplate.identification.statistics.profiles import profile
 from swashplate.maneuvers import source_tests
@@ -322,7 +322,7 @@ def test_estimate_and_interval_are_those_of_bayes(memory: float, scale: float) -
     if (memory, scale) != (0.0, 1.0):
         # unweighed the data would have swept the prior aside
         assert abs(first[0] - mean) > abs(best[0] - mean) + 0.3 * deviation
-    (said,) = prior_sentences(found.unknowns, best, told.quoted)
+    (said,) = prior_sentences(found.unknowns, best, told.quoted.standard_errors)
     assert "contributes 5" in said or "contributes 4" in said  # half of what is known
     assert "below its mean" in said
 
@@ -387,7 +387,7 @@ def test_a_loss_that_takes_all_for_outliers_is_refused() -> None:
         linearised_fit(made, np.array([2.0]), "cauchy")
 
 
-# --- fixed parameters and earlier stages ----------------------------------------------------------
+# --- fixed parameters -----------------------------------------------------------------------------
 
 
 DOUBTS = {"Z9": "3 %", "tau": 1e-3}
@@ -395,7 +395,7 @@ ONE = {"lag": RANGES["lag"], "start.place": RANGES["start.place"]}
 
 
 def stated(**doubts: float | str) -> FitSetup:
-    return load_setup("hoist").model_copy(update={"standard_uncertainty": doubts})
+    return determined_of("hoist", standard_uncertainty=doubts)
 
 
 @pytest.fixture(scope="module")
@@ -411,37 +411,35 @@ def campaign(tmp_path_factory: pytest.TempPathFactory) -> Campaign:
 def test_estimates_follow_a_fixed_number_as_in_a_fit_with_another(
     campaign: Campaign, name: str, deviation: float
 ) -> None:
-    """Of both stages: tau acts on the pump's by itself and through the card's estimates."""
+    """tau acts on the card's estimates, and on the pump's by itself and through the card's."""
     published = Drive.preset("hoist")
-    found = fit(published, campaign, stated(**DOUBTS)).stages
+    found = fit(published, campaign, stated(**DOUBTS))
     value = published.parameters.numbers[name]
     deviation *= value if name == "Z9" else 1.0
     step, ends = 0.05 * deviation, []
     for sign in (1.0, -1.0):
         moved = published.replace(**{name: value + sign * step})
-        stages = fit(moved, campaign, load_setup("hoist")).stages
-        ends.append([stage.solution.vector for stage in stages])
-    for k, each in enumerate(found):
-        told = uncertainty_of(each).own.determined
-        expected = ((ends[0][k] - ends[1][k]) * (deviation / (2.0 * step)))[told]
-        changes = uncertainty_of(each).systematic[f"uncertainty of {name}"][told]
-        # Gauss and Newton leave out the residuals' curvature, and where the filter sticks in its
-        # Coulomb band, which moves weak unknowns by about their own standard error
-        errors = uncertainty_of(each).own.standard_errors[told]
-        assert (np.abs(changes - expected) < 0.1 * np.abs(expected) + errors).all()
-        if k == 1:
-            assert (np.abs(changes) > 2.0 * errors).any()
-            assert (uncertainty_of(each).quoted.standard_errors[told] >= errors).all()
-            assert any("earlier stages" in words for words in uncertainty_of(each).sentences())
+        ends.append(fit(moved, campaign, stated()).solution.vector)
+    known = uncertainty_of(found)
+    told = known.own.determined
+    expected = ((ends[0] - ends[1]) * (deviation / (2.0 * step)))[told]
+    changes = known.systematic[f"uncertainty of {name}"][told]
+    # Gauss and Newton leave out the residuals' curvature, and where the filter sticks in its
+    # Coulomb band, which moves weak unknowns by about their own standard error
+    errors = known.own.standard_errors[told]
+    assert (np.abs(changes - expected) < 0.1 * np.abs(expected) + errors).all()
+    assert (np.abs(changes) > 2.0 * errors).any()
+    assert (known.quoted.standard_errors[told] >= errors).all()
+    assert any("fixed parameters" in words for words in known.sentences())
 
 
 def test_what_is_added_to_a_model_of_ones_own_is_that_of_other_fits() -> None:
     bare, doubted = (
-        fit(ModelSetup(servo, ONE, noise=NOISE, fixed={"gain": 1.5}, **more), RUNS).stages[0]
+        fit(ModelSetup(servo, ONE, noise=NOISE, fixed={"gain": 1.5}, **more), RUNS)
         for more in ({}, {"standard_uncertainty": {"gain": "4 %"}})
     )
     up, down = (
-        fit(ModelSetup(servo, ONE, noise=NOISE, fixed={"gain": gain}), RUNS).stages[0]
+        fit(ModelSetup(servo, ONE, noise=NOISE, fixed={"gain": gain}), RUNS)
         for gain in (1.506, 1.494)
     )
     (plain, *_), (wide, *_) = uncertainty_of(bare).estimates, uncertainty_of(doubted).estimates
@@ -457,8 +455,8 @@ def test_what_is_added_to_a_model_of_ones_own_is_that_of_other_fits() -> None:
 @pytest.mark.parametrize(
     ("name", "doubt", "words"),
     [
-        ("Z16_plus", "5 %", "Z16_plus .* stage 'pump'"),
-        ("Z20", 0.1, "Z20 .* stage 'pump'"),
+        ("Z16_plus", "5 %", "Z16_plus is free: only what stays fixed"),
+        ("Z20", 0.1, "Z20 is free: only what stays fixed"),
         ("Z9", "5", "standard_uncertainty.Z9"),
         ("Z9", -1.0, "standard_uncertainty.Z9"),
     ],
@@ -468,27 +466,17 @@ def test_it_is_written_and_read_and_refused_where_it_is_wrong(tmp_path, name, do
     path.write_text(setup_text(stated(**DOUBTS)), "utf-8")
     assert load_setup(path).standard_uncertainty == DOUBTS
     said = f'"{doubt}"' if isinstance(doubt, str) else doubt
-    text = f"standard_uncertainty = {{ {name} = {said} }}\n" + setup_text(load_setup("hoist"))
+    text = f"standard_uncertainty = {{ {name} = {said} }}\n" + setup_text(stated())
     path.write_text(text, "utf-8")
     with pytest.raises(ParameterError, match=words):
         load_setup(path)
 
 
-# --- earlier stages -------------------------------------------------------------------------------
-
-
 def test_variances_add_up_and_so_do_degrees_of_freedom() -> None:
-    """By hand: 4 + (0.5² 9 + 1² 1) = 7.25, each part with 8 degrees of freedom."""
+    """By hand: 4 with 8 degrees of freedom, and 1.5² + 1² that were stated: 7.25."""
     known = np.ones(1, dtype=bool)
     own = Covariance(unknowns_of(["p"], [1.0]), np.array([[4.0]]), known, np.array([8.0]))
-    earlier = Covariance(
-        unknowns_of(["a", "b"], [1.0, 1.0]),
-        np.diag([9.0, 1.0]),
-        np.ones(2, dtype=bool),
-        np.array([8.0, 8.0]),
-    )
-    both = with_earlier_stages(own, [EarlierStage(earlier, np.array([[0.5, 1.0]]))])
+    both = with_effects(own, {"gain": np.array([1.5]), "zero": np.array([-1.0])})
     assert both.matrix[0, 0] == pytest.approx(7.25)
-    spread = (4.0**2 + 2.25**2 + 1.0**2) / 8.0
-    assert both.degrees_of_freedom[0] == pytest.approx(7.25**2 / spread)
-    assert with_earlier_stages(own, []) is own
+    assert both.degrees_of_freedom[0] == pytest.approx(7.25**2 / (4.0**2 / 8.0))
+    assert with_effects(own, {}) is own

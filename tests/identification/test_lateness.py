@@ -25,8 +25,8 @@ def test_it_is_in_question_where_all_is_known_beforehand_and_nobody_stated_it() 
     stated = nominal.with_numbers({"solenoid_delay": 0.02}, frozenset({"late"}))
     assert not is_in_question(whole, stated)
     assert not is_in_question(whole_drive(nominal, part="pump"), nominal)
-    free = with_lateness(whole).stages[0].free
-    assert set(free) == {*whole.stages[0].free, *LATE}
+    free = with_lateness(whole).free
+    assert set(free) == {*whole.free, *LATE}
     assert all(free[name].prior.mean == 0.0 for name in LATE)
 
 
@@ -53,4 +53,4 @@ def test_a_delay_and_a_lag_behind_the_current_are_found(tmp_path) -> None:
 def test_a_machine_that_is_not_late_has_no_delay(tmp_path) -> None:
     campaign = virtual(tmp_path, "hoist", MANEUVERS, seed=2)
     result = fit(HOIST, campaign, whole_drive(HOIST.parameters))
-    assert not set(LATE) & set(result.setup.stages[0].free)
+    assert not set(LATE) & set(result.setup.free)

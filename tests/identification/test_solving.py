@@ -20,21 +20,21 @@ from swashplate import (
 )
 from swashplate.executors import Processes, Serial, Threads
 from swashplate.identification import (
+    FitSetup,
     Linearised,
     Prior,
     Problem,
     Solution,
-    Stage,
     Unknown,
     Unknowns,
     sobol_starts,
     solve,
     solve_from,
 )
+from swashplate.identification.estimation.fit_problem import problem_of
 from swashplate.identification.estimation.problem import Evaluation, noise_scales
 from swashplate.identification.estimation.setup import Free
 from swashplate.identification.estimation.solving import Progress
-from swashplate.identification.estimation.stages import stage_problem
 from swashplate.identification.estimation.unknowns import bounded
 
 
@@ -174,9 +174,9 @@ def test_starts_are_spread_seeded_and_inside(problem: Problem) -> None:
 @pytest.mark.slow
 def test_threads_and_processes_give_the_same_as_one_after_another(short_campaign: Campaign) -> None:
     free = {name: Free(relative=(0.5, 2.0)) for name in ("J_plus", "G1_plus")}
-    stage = Stage(name="card", part="card", free=free)
+    setup = FitSetup(part="card", free=free)
     nominal = Drive.preset("hoist").parameters
-    problem = stage_problem(stage, nominal, short_campaign.experiments[:1], threads=1)
+    problem = problem_of(setup, nominal, short_campaign.experiments[:1], threads=1)
     starts = list(sobol_starts(problem, 3, seed=2))
     here = solve_from(problem, starts, executor=Serial())
     for executor in (Threads(2), Processes(2)):

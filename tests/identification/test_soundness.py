@@ -44,7 +44,7 @@ def predicted(
 
 
 def found_in(runs: list[RunQuality]) -> list[Finding]:
-    return list(outlying_runs((), runs))
+    return list(outlying_runs(None, runs))
 
 
 @pytest.mark.parametrize("seed", range(20))

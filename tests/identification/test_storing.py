@@ -8,15 +8,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from tests.identification.given import TWO_STAGES, put
+from tests.identification.given import FEW, put
 from tests.marks import rest_slow
 
 from swashplate import Campaign, Drive, FileError, InputError, ParameterError
-from swashplate.identification import CrossValidation, Fit, Identification, Profile, Solution, fit
+from swashplate.identification import Fit, Identification, Profile, Solution, fit
 from swashplate.identification.fitting import fingerprint
-from swashplate.identification.resampling import Fold
 from swashplate.identification.statistics.interval_ends import Point
-from swashplate.identification.validation import Measures
 from swashplate.locks import locked
 
 STARTS = (
@@ -33,9 +31,8 @@ def campaign(short_campaign: Campaign) -> Campaign:
 
 @pytest.fixture(scope="module")
 def fitted(campaign: Campaign) -> Fit:
-    found = fit(Drive.preset("hoist").parameters, campaign.experiments, TWO_STAGES)
-    first, second = found.stages
-    return replace(found, stages=(replace(first, starts=STARTS), second))
+    found = fit(Drive.preset("hoist").parameters, campaign.experiments, FEW)
+    return replace(found, starts=STARTS)
 
 
 @pytest.fixture
@@ -48,7 +45,7 @@ def test_a_fit_comes_back_as_it_was(path: Path, campaign: Campaign, fitted: Fit)
     stored = Identification.load(path, campaign)
     # others read it, too: it is JSON without numbers of its own
     content = json.loads(path.read_text("utf-8"), parse_constant=lambda word: pytest.fail(word))
-    assert content["stages"][0]["starts"][1]["cost"] == "Infinity"
+    assert content["starts"][1]["cost"] == "Infinity"
     assert stored.fit.runs == stored.campaign.experiments
     assert [run.input.interpolation for run in stored.fit.runs] == [
         run.input.interpolation for run in fitted.runs
@@ -56,16 +53,14 @@ def test_a_fit_comes_back_as_it_was(path: Path, campaign: Campaign, fitted: Fit)
     assert stored.fit.setup == fitted.setup
     assert stored.fit.nominal == fitted.nominal
     assert stored.fit.parameters == fitted.parameters
-    for ours, theirs in zip(stored.fit.stages, fitted.stages, strict=True):
-        assert ours.stage == theirs.stage
-        for one, other in zip(ours.starts, theirs.starts, strict=True):
-            assert (one.number, one.cost) == (other.number, other.cost)
-            np.testing.assert_array_equal(one.vector, other.vector)
-        assert ours.values == theirs.values
-        costs = [each.problem.cost(each.solution.vector) for each in (ours, theirs)]
-        assert costs[0] == costs[1]
-        for name, value in vars(theirs.solution).items():
-            assert np.array_equal(getattr(ours.solution, name), value), name
+    for one, other in zip(stored.fit.starts, fitted.starts, strict=True):
+        assert (one.number, one.cost) == (other.number, other.cost)
+        np.testing.assert_array_equal(one.vector, other.vector)
+    assert stored.fit.values == fitted.values
+    costs = [each.problem.cost(each.solution.vector) for each in (stored.fit, fitted)]
+    assert costs[0] == costs[1]
+    for name, value in vars(fitted.solution).items():
+        assert np.array_equal(getattr(stored.fit.solution, name), value), name
 
 
 COMPUTED = (
@@ -85,7 +80,7 @@ def test_what_is_stored_is_not_computed_again(path, campaign, fitted, monkeypatc
     for name in COMPUTED:
         monkeypatch.setattr(f"swashplate.identification.{name}", refuse)
     # a value needs no interval, neither of a fit nor of its folder
-    bare = replace(fitted, stages=tuple(replace(stage) for stage in fitted.stages))
+    bare = replace(fitted)
     assert bare["Z10"].value == before["Z10"].value
     stored = Identification.load(path, campaign)
     for name in before:
@@ -102,8 +97,7 @@ def test_what_is_stored_is_not_computed_again(path, campaign, fitted, monkeypatc
 def test_what_is_not_stored_is_computed_when_it_is_asked_for(path, campaign, fitted) -> None:
     before = Identification(campaign, fitted)
     content = json.loads(path.read_text("utf-8"))
-    for stage in content["stages"]:
-        del stage["intervals"]
+    del content["intervals"]
     del content["verdict"]
     path.write_text(json.dumps(content), "utf-8")
     older = Identification.load(path, campaign)
@@ -116,7 +110,7 @@ def test_a_verdict_is_of_its_requirement_and_its_held_out_runs(short_campaign, t
     *fitted_to, held_out = short_campaign.experiments
     held_out = replace(held_out, role="validate")
     tests = replace(short_campaign, experiments=(*fitted_to, held_out))
-    found = fit(Drive.preset("hoist"), tests, TWO_STAGES)
+    found = fit(Drive.preset("hoist"), tests, FEW)
     strict = Identification(tests, found, required=1e-6)
     strict.save(tmp_path)
     stored = Identification.load(tmp_path, tests)
@@ -140,38 +134,27 @@ def test_two_do_not_save_into_one_folder_at_once(campaign, fitted, tmp_path) -> 
     assert Identification.load(tmp_path / "fitted", campaign)["Z10"] == result["Z10"]
 
 
-def test_profiles_folds_and_notes_come_back(tmp_path, campaign, fitted) -> None:
+def test_profiles_and_notes_come_back(tmp_path, campaign, fitted) -> None:
     points = tuple(Point(x, 3.0 + x * x, np.array([x, 0.5])) for x in (-0.1, 0.0, 0.1))
-    name, ends = fitted.stage("card").problem.unknowns.names[0], ("crossed", "bound")
-    profile = Profile(0, 3.0, points, 1.0, -0.1, None, ends, points[0], name, "card")
-    held = {"current": Measures(10, 0.1, 0.5)}
-    fold = Fold(0, ("a",), ("J",), held, True)
-    folds = CrossValidation(3, 2, (fold,), held, {"current": "A"})
+    name, ends = fitted.problem.unknowns.names[0], ("crossed", "bound")
+    profile = Profile(0, 3.0, points, 1.0, -0.1, None, ends, points[0], name)
     path = tmp_path / "fit.json"
-    result = Identification(campaign, fitted, profiles=[profile], folds=folds, notes={"seed": "3"})
+    result = Identification(campaign, fitted, profiles=[profile], notes={"seed": "3"})
     result.save(tmp_path)
     stored = Identification.load(path, campaign)
-    assert stored.folds == folds
     assert stored.notes == {"seed": "3"}
     (back,) = stored.profiles
-    assert (back.name, back.stage) == (profile.name, "card")
+    assert back.name == profile.name
     assert back.rise == profile.rise
     assert (back.lower, back.upper) == (-0.1, None)
     assert [each.cost for each in back.points] == [each.cost for each in points]
     assert np.array_equal(back.points[2].vector, points[2].vector)
     assert back.better is not None
 
-    # as files were before a profile had names of its own
     content = json.loads(path.read_text("utf-8"))
-    (entry,) = content["profiles"]
-    del entry["name"]
-    content["profiles"] = [[entry.pop("stage"), entry]]
+    content["profiles"][0]["index"] = 99
     path.write_text(json.dumps(content), "utf-8")
-    (older,) = Identification.load(path, campaign).profiles
-    assert (older.name, older.stage, older.rise) == (profile.name, "card", profile.rise)
-    entry["index"] = 99
-    path.write_text(json.dumps(content), "utf-8")
-    with pytest.raises(FileError, match="stage card .* parameter 100"):
+    with pytest.raises(FileError, match="profile of a parameter that it does not have"):
         Identification.load(path, campaign)
 
 
@@ -203,14 +186,18 @@ def test_another_campaign_is_refused(path: Path, campaign: Campaign) -> None:
 POISON = {
     "cut": (lambda text: text[:-100], "is not JSON"),
     "another key": (put('"axis"', '"ax"'), "'ax'.*'axis' is meant"),
-    "other parameters": (put('"Z10"', '"Z3"', 1), "stage pump has other parameters .* fit again"),
-    "another kind": (put('"kind": "parameter"', '"kind": "force"', 1), "stage card"),
+    "other parameters": (put('"Z10"', '"Z3"', 1), "other parameters than its fit setup: fit again"),
+    "another kind": (put('"kind": "parameter"', '"kind": "force"', 1), "other parameters"),
     "other version": (put('"swashplate": "[^"]*"', '"swashplate": "9.9"'), "9.9"),
     "text for a vector": (put(r'"vector": \[[^]]+\]', '"vector": "abc"'), "finite numbers"),
-    "far from its bounds": (put(r'"vector": \[[^]]+\]', '"vector": [1e308, 1e308]', 1), "bounds"),
+    "far from its bounds": (
+        put(r'"vector": \[[^]]+\]', '"vector": [1e308, 1e308, 1e308, 1e308, 1e308]', 1),
+        "outside its bounds: fit again",
+    ),
+    "of several stages": (put("^{", '{"stages": [],'), "fit in stages.* fit again"),
     "no run": (put(r'"runs": {[^}]+}', '"runs": {}'), "no run .* fit again"),
-    "wrong length": (put(r'"vector": \[[^]]+\]', '"vector": [1.0]', 1), "stage card"),
-    "too few intervals": (put(r'("intervals": \[)[^]]+\],', r"\1", 1), "stage card"),
+    "wrong length": (put(r'"vector": \[[^]]+\]', '"vector": [1.0]', 1), "other parameters"),
+    "too few intervals": (put(r'("intervals": \[)[^]]+\],', r"\1", 1), "other parameters"),
     "a number for the drive": (put('"nominal": ', '"nominal": 3, "was": '), "nominal"),
 }
 

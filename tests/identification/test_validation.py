@@ -182,8 +182,8 @@ def test_noise_of_a_position_is_no_error_of_the_speed_predicted(noise: float) ->
     assert found.rmse == pytest.approx(error, rel=0.02, abs=scatter)
     assert found.rmse < 0.7 * shown.rmse or noise < 2e-3
     assert found.spread == pytest.approx(np.pi / np.sqrt(2.0), rel=0.02)
-    assert assess_fit((), [compared(run, "position", place)]).usable
-    assert not assess_fit((), [compared(run, "position", 0.4 * place)]).usable
+    assert assess_fit(None, [compared(run, "position", place)]).usable
+    assert not assess_fit(None, [compared(run, "position", 0.4 * place)]).usable
 
 
 def test_rounding_to_counts_is_no_error_of_the_speed_predicted(tmp_path: Path) -> None:
@@ -194,7 +194,9 @@ def test_rounding_to_counts_is_no_error_of_the_speed_predicted(tmp_path: Path) -
     predicted = predict(hoist, runs)
     (seen,) = (q for q in with_speeds(predicted) if q.channel == "speed from counts")
     assert seen.measures.rmse > 0.02 * np.ptp(seen.simulated)
-    (stated,) = (each for each in assess_fit((), predicted).predictions if each.channel == "counts")
+    (stated,) = (
+        each for each in assess_fit(None, predicted).predictions if each.channel == "counts"
+    )
     # one run alone, of counts of 6 degrees: of a new one several times as much may be expected
     assert all(each.error < 0.2 for each in stated.classes)
 
@@ -208,7 +210,7 @@ def test_what_a_model_leaves_out_is_told_from_white_noise(noise: float, error: f
         tacho = speed + noise * random.normal(size=time.size)
         run = run_of(f"run {k}", time, {"shaft_speed": tacho}, time=time)
         runs.append(compared(run, "shaft_speed", (1.0 + error) * speed))
-    (stated,) = assess_fit((), runs).predictions
+    (stated,) = assess_fit(None, runs).predictions
     (large,) = (each.error for each in stated.classes if each.motion == "large")
     left = error * np.sqrt(0.5) / 2.0
     # of nine of ten new maneuvers: more than what was seen, and at most four times
@@ -219,7 +221,7 @@ def test_a_rounded_tacho_has_its_rounding_as_noise() -> None:
     time = np.arange(5120) / 512.0
     rounded = np.round(np.sin(time), 1)
     run = run_of("a", time, {"shaft_speed": rounded}, time=time)
-    (stated,) = assess_fit((), [compared(run, "shaft_speed", np.sin(time))]).predictions
+    (stated,) = assess_fit(None, [compared(run, "shaft_speed", np.sin(time))]).predictions
     assert all(each.error < 0.02 for each in stated.classes)
 
 

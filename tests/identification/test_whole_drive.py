@@ -17,8 +17,12 @@ from swashplate.identification import (
     whole_drive,
 )
 from swashplate.identification.estimation.between_samples import joined, settle
+from swashplate.identification.estimation.fit_problem import (
+    problem_of,
+    setup_of,
+    smooth,
+)
 from swashplate.identification.estimation.setup import setup_text
-from swashplate.identification.estimation.stages import setup_of, smooth, stage_problem
 from swashplate.maneuvers import parse
 from swashplate.parameters import DEFINITIONS
 
@@ -28,13 +32,12 @@ SPEED = run_of("a", np.sin(TIME), {"shaft_speed": np.sin(TIME)}, time=TIME)
 
 def unknowns_of(setup: FitSetup, drive: Drive | None = None) -> dict:
     parameters = HOIST if drive is None else drive.parameters
-    problem = stage_problem(setup.stages[0], parameters, [SPEED])
+    problem = problem_of(setup, parameters, [SPEED])
     return {unknown.name: unknown for unknown in problem.unknowns if unknown.run is None}
 
 
 def free(**entries: object) -> FitSetup:
-    stage = {"name": "some", "part": "chain", "free": entries}
-    return FitSetup.model_validate({"stages": [stage]})
+    return FitSetup.model_validate({"free": entries})
 
 
 def test_every_number_that_is_not_off_is_near_its_nominal_value() -> None:
@@ -99,7 +102,7 @@ def test_the_finest_encoder_counts_no_more_than_the_model_is_worth() -> None:
     step = {"bounds": (9.0, 16.0)}
     fine = run_of("a", np.sin(TIME), {"shaft_speed": np.sin(TIME)}, time=TIME, noise=1e-6)
     for entry, unit in ((step, 1e-6), ({"spread": 0.3}, 0.01 * np.ptp(np.sin(TIME)))):
-        problem = stage_problem(free(Z10=entry).stages[0], HOIST, [fine])
+        problem = problem_of(free(Z10=entry), HOIST, [fine])
         assert problem.scales["shaft_speed"] == pytest.approx(unit)
 
 
@@ -141,7 +144,11 @@ def test_without_a_current_it_is_what_is_estimated(campaign: Campaign) -> None:
     assert setup_of(campaign, axis, HOIST) == whole_drive(HOIST)
     neutral = Drive.preset("neutral").parameters
     of_no_machine = with_drive(campaign, "neutral")
-    assert setup_of(of_no_machine, axis, neutral) == load_setup("neutral")
+    of_any = setup_of(of_no_machine, axis, neutral)
+    assert of_any.part == "chain"
+    assert of_any.free.keys() == {"V_dz", "G1", "Z8", "tau"}
+    assert not any(entry.spread or entry.prior for entry in of_any.free.values())
+    assert set(of_any.channels) == {"shaft_speed", "position", "encoder_counts"}
 
 
 def with_drive(campaign: Campaign, name: str) -> Campaign:
@@ -202,8 +209,7 @@ def test_a_command_that_jumps_between_slow_samples_has_instants_one_way_and_none
     logged = replace(logged, input=replace(logged.input, settled=False))
     ways = ("linear", "previous", "jumps")
     counts = {
-        len(stage_problem(whole_drive(HOIST).stages[0], HOIST, joined([logged], way)).unknowns)
-        for way in ways
+        len(problem_of(whole_drive(HOIST), HOIST, joined([logged], way)).unknowns) for way in ways
     }
     assert len(counts) > 1
     found = settle([logged], smooth(HOIST), whole_drive(HOIST))

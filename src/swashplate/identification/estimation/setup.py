@@ -253,7 +253,7 @@ class FitSetup(Document):
 
     @property
     def has_spreads(self) -> bool:
-        """Whether something is known of each number beforehand: see `problems.whole_drive`."""
+        """Whether something is known of each number beforehand: see `fit_problem.whole_drive`."""
         entries = self.free.values()
         known = all(entry.spread or entry.prior for entry in entries)
         return self.forces is None and known and any(entry.spread for entry in entries)

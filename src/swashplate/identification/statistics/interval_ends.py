@@ -33,7 +33,7 @@ BETTER = 0.02
 smaller difference moves the ends of an interval by less than 1 % of their distance."""
 CLOSE = 1e-3
 """Relative error in the root of the cost's rise at which a crossing counts as found."""
-CLOSE_ENOUGH = 0.02
+CLOSE_ENOUGH = 0.005
 """The same of an interval's end that is looked for again: of its half width."""
 SETTLED = 0.01
 """Part of the cost's rise to a threshold by which the others, fitted, need not fall any further."""
