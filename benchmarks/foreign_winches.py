@@ -368,8 +368,8 @@ def with_offset(path):
 def new_work(program, winch, seed, folder):
     """Error of the speed in a recording of ordinary work, % of its range, beside the band.
 
-    The fitted drive gets the exact command. "off" is the RMS error, "band" that of the band's half width,
-    "inside" the share of the samples in it.
+    The fitted drive gets the exact command. "off" is the RMS error, "band" the same of the band's
+    half width, "inside" the share of the samples in it.
     """
     exact, command, speed = write_log(folder / "work.csv", winch, "work", seed, with_current=False)
     write_table(folder / "exact.csv", {"time": exact, "voltage": command})
