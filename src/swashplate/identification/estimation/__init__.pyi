@@ -1,3 +1,4 @@
+from .between_samples import joined as joined
 from .drive_model import LIMIT_COLUMNS as LIMIT_COLUMNS
 from .drive_model import at_rate_of as at_rate_of
 from .drive_model import limits_unreached as limits_unreached
@@ -5,6 +6,8 @@ from .drive_model import voltage_record as voltage_record
 from .model import states_started_by as states_started_by
 from .model_setup import loaded_module as loaded_module
 from .setup import Forces as Forces
+from .setup import Free as Free
 from .stages import Parameters as Parameters
 from .stages import setup_of as setup_of
 from .stages import smooth as smooth
+from .stages import stage_problem as stage_problem
