@@ -22,6 +22,7 @@ from swashplate.drive import Drive
 from swashplate.errors import InputError, UnknownNameError
 from swashplate.executors import Executor, Serial
 from swashplate.identification import tables
+from swashplate.identification.contradiction import weight_of_currents, with_weight_of_currents
 from swashplate.identification.diagnostics.data_checks import (
     check_model,
     check_rank,
@@ -53,7 +54,12 @@ from swashplate.identification.estimation.stages import (
     with_estimates,
 )
 from swashplate.identification.estimation.unknowns import Prior
-from swashplate.identification.lateness import is_in_question, lateness_of, with_lateness
+from swashplate.identification.lateness import (
+    is_in_question,
+    is_whole_drive,
+    lateness_of,
+    with_lateness,
+)
 from swashplate.identification.stage_fit import Interval, StageFit
 from swashplate.identification.statistics.intervals import Estimate, uncertainty_of, weighed
 from swashplate.machine import Model as Equations
@@ -365,6 +371,11 @@ def fit(
         if late:
             setup = with_lateness(setup)
             near = stages[0].values | late
+            stages = staged(setup, nominal, runs, solved, threads=threads)
+        factor = weight_of_currents(stages[0]) if is_whole_drive(setup, nominal) else 1.0
+        if factor < 1.0:
+            setup = with_weight_of_currents(setup, factor)
+            near = dict(stages[0].values)
             stages = staged(setup, nominal, runs, solved, threads=threads)
     doubts += tuple(each for stage in stages for each in _unlike(stage, nominal.name))
     return Fit(setup, nominal, tuple(runs), stages, doubts)

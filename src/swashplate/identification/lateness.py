@@ -31,14 +31,20 @@ EXPLAINS = 0.002
 """Part of the cost that they must explain, others following: next to nothing is chance."""
 
 
-def is_in_question(setup: FitSetup, nominal: Parameters) -> bool:
-    """Whether a setup takes the whole of a drive by its priors, and nobody stated a lateness."""
+def is_whole_drive(setup: FitSetup, nominal: Parameters) -> bool:
+    """Whether a setup takes the whole of a drive by its priors."""
     return (
         isinstance(nominal, ParameterSet)
         and len(setup.stages) == 1
         and setup.stages[0].has_spreads
         and setup.stages[0].part == "chain"
-        and not any(name in setup.stages[0].free or nominal.numbers.get(name) for name in LATE)
+    )
+
+
+def is_in_question(setup: FitSetup, nominal: Parameters) -> bool:
+    """Whether a setup takes the whole of a drive by its priors, and nobody stated a lateness."""
+    return is_whole_drive(setup, nominal) and not any(
+        name in setup.stages[0].free or nominal.numbers.get(name) for name in LATE
     )
 
 

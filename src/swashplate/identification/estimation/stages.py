@@ -73,8 +73,9 @@ LIKE_NAMED = 0.3
 """How near a machine's numbers are taken to be to those of the drive that is named for it, a
 standard deviation of their logarithms: what differs between machines of a kind is not known, so
 this is wide. [1]"""
-CERTAIN_OF_MOTION = 0.012
-"""Largest interval between the samples of an edge that a motion alone does not tell. [s]"""
+CERTAIN = 0.009
+"""Interval between the samples of an edge up to which its instant is no unknown among numbers that
+have priors: 125 samples a second. [s]"""
 LARGEST_START_PRESSURE = 4e6
 """Bound of a free pressure at the start if the fit setup gives none. [Pa]"""
 
@@ -268,7 +269,7 @@ def stage_problem(
         unknowns += _of_a_run(stage, run, channels, parameters)
     if stage.part != "pump" or stage.current != "measured":
         edges = [unknown for run in runs for unknown in unknown_instants(run, instants)]
-        if len(edges) <= MOST_EDGES and not _edges_are_certain(stage, runs, channels):
+        if len(edges) <= MOST_EDGES and not _edges_are_certain(stage, runs):
             unknowns += edges
     return Problem(
         model,
@@ -287,17 +288,14 @@ def stage_problem(
     )
 
 
-def _edges_are_certain(stage: Stage, runs: Sequence[Experiment], channels: Sequence[str]) -> bool:
+def _edges_are_certain(stage: Stage, runs: Sequence[Experiment]) -> bool:
     """Whether the instants of the command's edges, halfway between samples, are certain enough.
 
-    A motion is later by at most half an interval, which a fit that grants every model an error of
-    1 % of the range does not see; but a current jumps with the command.
+    A fit that grants every model an error of 1 % of the range does not see by which part of a short
+    interval they are off, some earlier and some later.
     """
-    kinds = {run.channels[name].kind for run in runs for name in channels if name in run.channels}
-    if not stage.has_spreads or not kinds.isdisjoint(CURRENTS):
-        return False
     intervals = [edge.interval for run in runs for edge in run.input.edges]
-    return max(intervals, default=0.0) <= CERTAIN_OF_MOTION
+    return stage.has_spreads and float(np.median(intervals or [0.0])) <= CERTAIN
 
 
 def _currents(
