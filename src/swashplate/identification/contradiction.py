@@ -8,7 +8,9 @@ motion to be followed as well as the model can.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -28,8 +30,17 @@ EVALUATIONS, TOLERANCE = 40, 1e-4
 """Of that search."""
 
 
-def weight_of_currents(stage: StageFit) -> float:
-    """Factor on the squared errors of currents, 1 where they do not keep the motion away.
+class Freed(NamedTuple):
+    """What a fit becomes if its currents no longer keep the motion away."""
+
+    factor: float
+    """On the squared errors of currents. [1]"""
+    values: Mapping[str, float]
+    """The unknowns by their labels, near the optimum."""
+
+
+def less_of_currents(stage: StageFit) -> Freed | None:
+    """By how much less currents must count; None if they do not keep the motion away.
 
     From where the fit ended a search goes on in which currents count next to nothing. If the motion
     is then followed better, each channel is given the error that the model has there: the factor is
@@ -43,25 +54,22 @@ def weight_of_currents(stage: StageFit) -> float:
         if name in run.channels
     }
     currents = [name for name, kind in kinds.items() if kind in CURRENTS]
-    if not currents or len(currents) == len(kinds):
-        return 1.0
-    scales = {
-        name: scale * (LOOSER if name in currents else 1.0)
-        for name, scale in problem.scales.items()
-    }
-    loose = replace(problem, scales=scales)
+    motions = [name for name in kinds if name not in currents]
+    if not currents or not motions:
+        return None
+    looser = {name: LOOSER * problem.scales[name] for name in currents}
+    loose = replace(problem, scales={**problem.scales, **looser})
     start = stage.solution.vector
     try:
         free = solve(loose, start, tolerance=TOLERANCE, max_evaluations=EVALUATIONS).vector
     except DomainError:
-        return 1.0
+        return None
     before, after = _mean_squares(problem, start), _mean_squares(problem, free)
-    motions = [name for name in kinds if name not in currents]
     motion = sum(after[name] for name in motions)
     if sum(before[name] for name in motions) < CONTRADICTS**2 * motion:
-        return 1.0
+        return None
     ratio = (motion / len(motions)) / (sum(after[name] for name in currents) / len(currents))
-    return min(ratio, 1.0)
+    return Freed(min(ratio, 1.0), problem.unknowns.values(free))
 
 
 def _mean_squares(problem: Problem, vector: Vector) -> dict[str, float]:

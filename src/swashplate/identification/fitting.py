@@ -22,7 +22,7 @@ from swashplate.drive import Drive
 from swashplate.errors import InputError, UnknownNameError
 from swashplate.executors import Executor, Serial
 from swashplate.identification import tables
-from swashplate.identification.contradiction import weight_of_currents, with_weight_of_currents
+from swashplate.identification.contradiction import less_of_currents, with_weight_of_currents
 from swashplate.identification.diagnostics.data_checks import (
     check_model,
     check_rank,
@@ -93,10 +93,10 @@ WINDOW = 1.0
 CLIFFS = 2
 """How often such a search goes on where the cost jumps: where a dead zone passes a level of a
 staircase."""
-WITH_PRIORS = 1e-8
+WITH_PRIORS = 1e-6
 """Tolerance of a search in which every number has a prior: what changes the cost by less lies along
 directions that only these hold."""
-BEFORE_WEIGHING = 1e-6
+BEFORE_WEIGHING = 1e-4
 """And of the one before it is known what the residuals are worth."""
 FAR = 3.0
 """Deviations beyond which a number is not like that of the named drive: by chance one of 40 is in a
@@ -364,19 +364,12 @@ def fit(
         settled = settle(runs, smooth(nominal), setup, loss=loss, threads=threads)
         runs, near = settled.runs, dict(settled.near)
         doubts += settled.sentences
-        stages = staged(setup, nominal, runs, solved, threads=threads)
-        late = {}
-        if is_in_question(setup, nominal):
-            late = lateness_of(stages[0], runs, smooth(nominal))
-        if late:
-            setup = with_lateness(setup)
-            near = stages[0].values | late
-            stages = staged(setup, nominal, runs, solved, threads=threads)
-        factor = weight_of_currents(stages[0]) if is_whole_drive(setup, nominal) else 1.0
-        if factor < 1.0:
-            setup = with_weight_of_currents(setup, factor)
-            near = dict(stages[0].values)
-            stages = staged(setup, nominal, runs, solved, threads=threads)
+        asked = _Asked(setup, near)
+        if is_whole_drive(setup, nominal):
+            stages_of = partial(staged, nominal=nominal, runs=runs, threads=threads)
+            asked = _asked_for(setup, near, loss, stages_of)
+        setup, near = asked.setup, dict(asked.near)
+        stages = asked.interrupted or staged(setup, nominal, runs, solved, threads=threads)
     doubts += tuple(each for stage in stages for each in _unlike(stage, nominal.name))
     return Fit(setup, nominal, tuple(runs), stages, doubts)
 
@@ -395,6 +388,51 @@ def _unlike(stage: StageFit, drive: str) -> Iterator[str]:
             f"The machine is not like {drive}, from whose numbers differ {listed(far)}. Begin from "
             "a drive that it is like, or let 'swashplate guess' read one off the logs."
         )
+
+
+class _Asked(NamedTuple):
+    """A setup of a whole drive with what the runs ask for beyond it."""
+
+    setup: FitSetup
+    near: Mapping[str, float]
+    """Values near the optimum by the unknowns' labels; none if unknown."""
+    interrupted: tuple[StageFit, ...] = ()
+    """Stages of a rough fit that was interrupted."""
+
+
+def _asked_for(
+    setup: FitSetup,
+    near: Mapping[str, float],
+    loss: Loss,
+    stages_of: Callable[..., tuple[StageFit, ...]],
+) -> _Asked:
+    """What runs ask for: a lateness behind the current, and currents that count less.
+
+    By rough fits, which end where a step changes the cost by less than `ROUGH` of itself.
+    """
+
+    def rough(_: Stage, problem: Problem) -> SolvedStage:
+        start = problem.unknowns.vector_of(near) if near else approached(problem, loss=loss)
+        solution = solve(problem, start, loss=loss, tolerance=ROUGH, keep_best=True)
+        if solution.interrupted:
+            return SolvedStage(problem, solution)
+        return SolvedStage(weighed(problem, solution.vector), solution)
+
+    with working("Searching roughly"):
+        (stage,) = stages_of(setup, solved=rough)
+        if stage.solution.interrupted:
+            return _Asked(setup, near, (stage,))
+        near = stage.values
+        if is_in_question(setup, stage.parameters) and (late := lateness_of(stage)):
+            setup, near = with_lateness(setup), near | late
+            (stage,) = stages_of(setup, solved=rough)
+            if stage.solution.interrupted:
+                return _Asked(setup, near, (stage,))
+            near = stage.values
+        freed = less_of_currents(stage)
+        if freed is not None:
+            setup, near = with_weight_of_currents(setup, freed.factor), freed.values
+    return _Asked(setup, near)
 
 
 class _Stated(NamedTuple):

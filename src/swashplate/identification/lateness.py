@@ -7,13 +7,12 @@ are in question after each fit of a whole drive, and become free if they are mor
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 
-from swashplate.campaign import Experiment
 from swashplate.errors import DomainError
+from swashplate.identification.estimation.drive_model import DriveModel
 from swashplate.identification.estimation.setup import FitSetup, Free, Stage
 from swashplate.identification.estimation.stages import Parameters, stage_problem
 from swashplate.identification.estimation.unknowns import Prior
@@ -56,16 +55,16 @@ def with_lateness(setup: FitSetup) -> FitSetup:
     return setup.model_copy(update={"stages": (late,)})
 
 
-def lateness_of(
-    stage_fit: StageFit, runs: Sequence[Experiment], nominal: Parameters
-) -> dict[str, float]:
+def lateness_of(stage_fit: StageFit) -> dict[str, float]:
     """Delay and lag that the runs ask for, to begin a search at; none if they ask for none. [s]
 
     By one step of Gauss and Newton from where the fit ended, of all numbers with both beside them:
     their sum must matter, and the step must take a part of the cost away.
     """
     late: Stage = with_lateness(FitSetup(stages=(stage_fit.stage,))).stages[0]
-    problem = stage_problem(late, nominal, runs, threads=stage_fit.problem.threads)
+    model, runs = stage_fit.problem.model, stage_fit.problem.experiments
+    assert isinstance(model, DriveModel)
+    problem = stage_problem(late, model.parameters, runs, threads=stage_fit.problem.threads)
     fitted = stage_fit.problem.unknowns
     worths = [unknown.worth for unknown in fitted if unknown.prior is not None]
     usual = float(np.median(worths)) if worths else 1.0
