@@ -306,7 +306,7 @@ def compared(folder, winch):
     """Numbers that matter of the fit in a folder beside the winch's."""
     stored = json.loads((folder / "fitted" / "fit.json").read_text("utf-8"))
     found = {}
-    for entry in (stored.get("key_numbers") or {}).get("numbers", []):
+    for entry in ((stored["verdict"] or {}).get("key_numbers") or {}).get("numbers", []):
         name, direction, _, value, lower, upper = entry[:6]
         found[f"{name}_{direction}"] = (value, lower, upper)
     rows = []

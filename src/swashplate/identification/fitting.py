@@ -54,6 +54,7 @@ from swashplate.identification.estimation.stages import (
     with_estimates,
 )
 from swashplate.identification.estimation.unknowns import Prior
+from swashplate.identification.jump import first_jumps, unseen_jumps, with_jumps
 from swashplate.identification.lateness import (
     is_in_question,
     is_whole_drive,
@@ -367,7 +368,7 @@ def fit(
         asked = _Asked(setup, near)
         if is_whole_drive(setup, nominal):
             stages_of = partial(staged, nominal=nominal, runs=runs, threads=threads)
-            asked = _asked_for(setup, near, loss, stages_of)
+            asked = _asked_for(setup, nominal, near, loss, stages_of)
         setup, near = asked.setup, dict(asked.near)
         stages = asked.interrupted or staged(setup, nominal, runs, solved, threads=threads)
     doubts += tuple(each for stage in stages for each in _unlike(stage, nominal.name))
@@ -402,27 +403,33 @@ class _Asked(NamedTuple):
 
 def _asked_for(
     setup: FitSetup,
+    nominal: Parameters,
     near: Mapping[str, float],
     loss: Loss,
     stages_of: Callable[..., tuple[StageFit, ...]],
 ) -> _Asked:
-    """What runs ask for: a lateness behind the current, and currents that count less.
+    """What runs ask for: jumps, a lateness behind the current, and currents that count less.
 
     By rough fits, which end where a step changes the cost by less than `ROUGH` of itself.
     """
 
     def rough(_: Stage, problem: Problem) -> SolvedStage:
-        start = problem.unknowns.vector_of(near) if near else approached(problem, loss=loss)
+        begin = near or problem.unknowns.values(approached(problem, loss=loss))
+        start = problem.unknowns.vector_of({**begin, **first})
         solution = solve(problem, start, loss=loss, tolerance=ROUGH, keep_best=True)
         if solution.interrupted:
             return SolvedStage(problem, solution)
         return SolvedStage(weighed(problem, solution.vector), solution)
 
+    currents = unseen_jumps(nominal)
+    if currents:
+        setup = with_jumps(setup, currents)
+    first = first_jumps(currents)
     with working("Searching roughly"):
         (stage,) = stages_of(setup, solved=rough)
         if stage.solution.interrupted:
             return _Asked(setup, near, (stage,))
-        near = stage.values
+        near, first = stage.values, {}
         if is_in_question(setup, stage.parameters) and (late := lateness_of(stage)):
             setup, near = with_lateness(setup), near | late
             (stage,) = stages_of(setup, solved=rough)

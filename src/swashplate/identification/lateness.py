@@ -20,8 +20,11 @@ from swashplate.identification.stage_fit import StageFit
 from swashplate.parameters import ParameterSet
 
 LATE = ("solenoid_delay", "solenoid_lag")
-USUAL = 0.03
-"""Standard deviation of each beforehand, about 0: proportional valves take 10 to 60 ms. [s]"""
+USUAL = {"solenoid_delay": 0.05, "solenoid_lag": 0.1}
+"""Standard deviation of each beforehand, about 0: proportional valves take 10 to 60 ms, and of what
+follows them, which may be as slow as the pump, the lag is all that stands for it. [s]"""
+FIRST = 0.03
+"""At most where a search begins. [s]"""
 LARGEST = 0.5
 """[s]"""
 MATTERS = 0.003
@@ -49,9 +52,11 @@ def is_in_question(setup: FitSetup, nominal: Parameters) -> bool:
 
 def with_lateness(setup: FitSetup) -> FitSetup:
     """The setup with a delay and a lag between current and spool, known to be near 0."""
-    free = Free(bounds=(0.0, LARGEST), prior=Prior(0.0, USUAL))
+    free = {
+        name: Free(bounds=(0.0, LARGEST), prior=Prior(0.0, usual)) for name, usual in USUAL.items()
+    }
     (stage,) = setup.stages
-    late = stage.model_copy(update={"free": {**stage.free, **dict.fromkeys(LATE, free)}})
+    late = stage.model_copy(update={"free": {**stage.free, **free}})
     return setup.model_copy(update={"stages": (late,)})
 
 
@@ -84,5 +89,5 @@ def lateness_of(stage_fit: StageFit) -> dict[str, float]:
     if sizes.sum() < MATTERS or left > (1.0 - EXPLAINS) * squares:
         return {}
     # a search that begins at a bound stays there
-    begin = np.clip(sizes, MATTERS, USUAL).tolist()
+    begin = np.clip(sizes, MATTERS, FIRST).tolist()
     return dict(zip(LATE, begin, strict=True))
