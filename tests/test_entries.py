@@ -26,15 +26,13 @@ file = "x.csv"
 weight = 5.0
 """
 SETUP = """
-[[stages]]
-name = "card"
 part = "card"
 current_scale = 1.0
-[stages.free.Z1]
+[free.Z1]
 relative = [0.5, 2.0]
 log = true
 prior = { mean = 3.0, deviation = 4.0 }
-[stages.forces]
+[forces]
 plus = [0.1, 0.2, 0.3, 0.4]
 minus = [0.15, 0.25, 0.35, 0.45]
 [standard_uncertainty]
@@ -80,7 +78,7 @@ def test_numbers_of_a_campaign(tmp_path):
 
 def test_numbers_of_a_fit_configuration(tmp_path):
     path = tmp_path / "setup.toml"
-    assert load_setup(_written(path, SETUP)).stages[0].free["Z1"].relative == (0.5, 2.0)
+    assert load_setup(_written(path, SETUP)).free["Z1"].relative == (0.5, 2.0)
     assert refused(load_setup, path, variants(SETUP, NUMBER, truth, quoted)) == 28
     assert refused(load_setup, path, variants(SETUP, "true", lambda _: "1")) == 1
 

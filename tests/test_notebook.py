@@ -13,7 +13,7 @@ import nbformat
 import pytest
 from nbclient import NotebookClient
 from PIL import Image
-from tests.identification.given import TWO_STAGES, virtual
+from tests.identification.given import FEW, virtual
 
 from swashplate import maneuvers
 from swashplate.identification.estimation.setup import setup_text
@@ -67,7 +67,7 @@ def notebook(tmp_path_factory: pytest.TempPathFactory) -> dict[str, list[Any]]:
     """What each cell put out, by its name."""
     folder = tmp_path_factory.mktemp("notebook")
     virtual(folder, "hoist", TESTS, seed=1, validate=["last"])
-    (folder / "setup.toml").write_text(setup_text(TWO_STAGES), "utf-8")
+    (folder / "setup.toml").write_text(setup_text(FEW), "utf-8")
     cells = [nbformat.v4.new_code_cell(text) for text in CELLS.values()]
     book = nbformat.v4.new_notebook(cells=cells)
     client = NotebookClient(book, timeout=400, kernel_name="python3", resources={})

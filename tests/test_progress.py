@@ -8,7 +8,7 @@ from io import StringIO
 from pathlib import Path
 
 import pytest
-from tests.identification.given import TWO_STAGES, virtual
+from tests.identification.given import FEW, virtual
 
 from swashplate import Drive, maneuvers, progress
 from swashplate.identification import Search, fit
@@ -33,19 +33,19 @@ class Lines:
 def test_work_is_logged_and_shown_from_its_beginning_to_its_end(caplog) -> None:
     lines = Lines()
     with caplog.at_level(logging.INFO, "swashplate"), progress.shown_by(lines):
-        with progress.working("Fitting hoist"), progress.working("Stage card") as stage:
-            stage.at("evaluation 3")
-            stage.at("evaluation 4")  # too soon after the last
+        with progress.working("Fitting hoist"), progress.working("Searching") as search:
+            search.at("evaluation 3")
+            search.at("evaluation 4")  # too soon after the last
         with pytest.raises(ZeroDivisionError), progress.working("Judging"):
             raise ZeroDivisionError
-    assert lines.shown[:2] == ["Fitting hoist", "Fitting hoist: stage card"]
-    assert "Fitting hoist: stage card: evaluation 4" not in lines.shown
+    assert lines.shown[:2] == ["Fitting hoist", "Fitting hoist: searching"]
+    assert "Fitting hoist: searching: evaluation 4" not in lines.shown
     assert lines.shown[-1] == "Judging"
     assert lines.ended == ["Fitting hoist", "Judging"]
     said = [record.getMessage() for record in caplog.records]
-    assert said[:2] == ["Fitting hoist", "Stage card"]
+    assert said[:2] == ["Fitting hoist", "Searching"]
     assert [line.partition(":")[0] for line in said[2:]] == [
-        "Stage card",
+        "Searching",
         "Fitting hoist",
         "Judging",
         "Judging",
@@ -67,18 +67,18 @@ def test_items_are_counted(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(progress, "OFTEN", 0.0)
     lines = Lines()
     with progress.shown_by(lines):
-        assert list(progress.counted("abc", 3, "folds", "Validating")) == ["a", "b", "c"]
-    assert lines.shown[1:] == [f"Validating: {done} of 3 folds" for done in (1, 2, 3)]
+        assert list(progress.counted("abc", 3, "runs", "Validating")) == ["a", "b", "c"]
+    assert lines.shown[1:] == [f"Validating: {done} of 3 runs" for done in (1, 2, 3)]
 
 
 def test_a_prompt_gets_one_line_that_is_wiped_out(capsys, monkeypatch) -> None:
     monkeypatch.setenv("COLUMNS", "20")
     line = progress.TerminalLine()
-    line.show("Fitting hoist: stage card")
+    line.show("Fitting hoist: searching")
     line.show("Judging")
     line.end(progress.Work("Judging"))
     first, second, last = capsys.readouterr().err.split("\r")[1:4]
-    assert first == "Fitting hoist: sta…"
+    assert first == "Fitting hoist: sea…"
     assert second == f"{'Judging':19}"
     assert not last.strip()
 
@@ -103,16 +103,15 @@ def test_a_script_shows_a_line_on_a_terminal_only_and_not_beside_the_log(
     assert written(Terminal()) == ""
 
 
-def test_a_fit_says_its_stages_evaluations_and_cost(tmp_path: Path, caplog) -> None:
+def test_a_fit_says_its_evaluations_and_cost(tmp_path: Path, caplog) -> None:
     campaign = virtual(tmp_path, "hoist", TESTS, seed=1)
     lines = Lines()
     with caplog.at_level(logging.INFO, "swashplate"), progress.shown_by(lines):
-        fitted = fit(Drive.preset("hoist"), campaign, TWO_STAGES, search=Search(0))
-    for stage in fitted.stages:
-        ending = f"Stage {stage.stage.name}: {stage.solution.message} after "
-        line = next(each for each in caplog.messages if each.startswith(ending))
-        assert f"{stage.solution.evaluations} evaluations, cost {stage.solution.cost:.5g}" in line
-        assert f"Fitting hoist: stage {stage.stage.name}" in lines.shown
+        fitted = fit(Drive.preset("hoist"), campaign, FEW, search=Search(0))
+    solution = fitted.solution
+    said = f"after {solution.evaluations} evaluations, cost {solution.cost:.5g}"
+    assert f"Search: {solution.message} {said}" in caplog.messages
+    assert "Fitting hoist: searching" in lines.shown
     assert len(lines.ended) == 1
 
 

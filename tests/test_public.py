@@ -89,7 +89,7 @@ import swashplate
 from swashplate import Campaign, Drive, Identification, maneuvers
 from swashplate.identification import Verdict
 
-result = swashplate.identify("campaign.toml", "hoist", {"Z8": (0.5, 2.0)}, folds=5)
+result = swashplate.identify("campaign.toml", "hoist", {"Z8": (0.5, 2.0)}, starts=5)
 assert_type(result, Identification)
 assert_type(result.drive, Drive)
 assert_type(result.verdict, Verdict)
@@ -106,7 +106,7 @@ run = hoist.simulate(maneuvers.step(9.0))
 run.to_pandas(units="display")
 run.to_pandas(units="bar")  # ERROR
 swashplate.identify(3)  # ERROR
-swashplate.identify("campaign.toml", fold=5)  # ERROR
+swashplate.identify("campaign.toml", start=5)  # ERROR
 """
 
 

@@ -16,7 +16,7 @@ import numpy as np
 import pytest
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from tests.identification.given import TWO_STAGES, virtual
+from tests.identification.given import FEW, virtual
 from typer.testing import CliRunner
 
 import swashplate
@@ -62,7 +62,7 @@ class Work(NamedTuple):
 @pytest.fixture(scope="module")
 def work(tmp_path_factory: pytest.TempPathFactory) -> Work:
     campaign = virtual(tmp_path_factory.mktemp("tests"), "hoist", TESTS, seed=1)
-    fitted = fit(Drive.preset("hoist"), campaign, TWO_STAGES)
+    fitted = fit(Drive.preset("hoist"), campaign, FEW)
     judged = Identification(campaign, fitted)
     return Work(campaign, fitted, judged)
 
@@ -149,7 +149,7 @@ def test_every_public_class_has_a_short_repr(work: Work) -> None:
             five,
             five.simulate(voltage),
             compare(five, five.drive.simulate(voltage)),
-            run_information(work.fitted.setup.stages[0], hoist, runs),
+            run_information(work.fitted.setup, hoist, runs),
             guess_drive(runs),
             *analyses(hoist),
             examine(runs[0]),
@@ -256,12 +256,12 @@ def test_a_figure_of_chosen_signals() -> None:
 @pytest.mark.slow
 def test_summaries_and_tables_of_a_notebook(work: Work) -> None:
     said = work.fitted.summary()
-    for words in ("Stage card", "Stage pump", "lower 95 %", "Fixed at their nominal values: V_dz"):
+    for words in ("Search: ", "Estimates", "lower 95 %", "Fixed at their nominal values: V_dz"):
         assert words in said
     assert f"{work.fitted.drive['Z10'].value:.4f}"[:5] in said
     html = work.fitted._repr_html_()
     assert html is not None
-    assert html.count("<table>") == len(work.fitted.tables()) == 4
+    assert html.count("<table>") == len(work.fitted.tables()) == 3
     assert "<li>Fixed at their nominal values: V_dz" in html
     assert "step +4 V" in work.campaign.summary()
     assert "V_dz" in Drive.preset("hoist").summary()
@@ -295,14 +295,15 @@ def test_a_verdict_is_the_first_that_is_read(work: Work) -> None:
     before, _, after = html.partition("<details>")
     numbers = work.judged.key_numbers
     assert numbers is not None
-    assert before.index(numbers.table()._repr_html_()) < before.index("Stage card")
+    assert before.index(numbers.table()._repr_html_()) < before.index("Estimates")
     assert str(numbers.table()) in work.judged.summary()
-    assert work.fitted.stages[-1].problem.unknowns.names[0] in before
+    assert work.fitted.problem.unknowns.names[0] in before
     stated = before.index(verdict.table().title)
-    assert before.index("Stage card") < before.index("Stage pump") < stated
+    assert before.index("Estimates") < stated
+    assert "Search: " in after
     assert [each.channel for each in verdict.predictions] == ["current", "counts"]
     assert all(before.index(f"{each.signal}</td>") > stated for each in verdict.predictions)
-    assert "The tests determine all 2 free parameters" in after
+    assert "The tests determine all 6 free parameters" in after
     assert "held-out runs" not in html  # there are none
     # the free zeros of the runs' counts are in no table for people
     zeros = [name for name in work.judged if name.startswith("offset")]
@@ -311,23 +312,18 @@ def test_a_verdict_is_the_first_that_is_read(work: Work) -> None:
 
 
 @pytest.mark.slow
-def test_profiles_and_folds_show_tables(work: Work) -> None:
-    result = swashplate.identify(
-        work.campaign, Drive.preset("hoist"), TWO_STAGES, folds=3, profiles=["Z10"]
-    )
-    whole = result.summary()
+def test_profiles_show_tables(work: Work) -> None:
+    result = swashplate.identify(work.campaign, Drive.preset("hoist"), FEW, profiles=["Z10"])
+    assert "Profile likelihoods" in result.summary()
     (profile,) = result.profiles
-    lines = [line.split() for line in profile.summary().splitlines()]
-    values = [float(cells[0]) for cells in lines if cells[1:2] == ["1/s"]]
+    assert "Profile likelihood of Z10" in profile.summary()
+    (table,) = profile.tables()
+    values, _, rises = (column.to_list() for column in table.to_polars())
     # the profile's ends are among its points, and its least cost is at the estimate
     assert values == sorted(values)
     assert values[0] < result["Z10"].value < values[-1]
-    rises = [float(cells[2]) for cells in lines if cells[1:2] == ["1/s"]]
     assert min(rises) == 0.0
     assert values[rises.index(0.0)] == pytest.approx(result["Z10"].value, rel=1e-3)
-    assert "Cross-validation" in result.folds.summary()
-    assert "Cross-validation" in whole
-    assert all(name in result.folds.summary() for name in result.fit.runs[0].channels)
 
 
 def test_a_run_says_what_the_command_prints() -> None:
@@ -382,7 +378,7 @@ def test_only_what_can_be_drawn_has_a_plot(work: Work) -> None:
     assert "steady gain" in linear.summary()
     assert isinstance(TESTS[0].plot(), Figure)
     assert isinstance(work.campaign.experiments[0]["current"].plot(), Figure)
-    assert isinstance(work.fitted.stages[0].runs[0].plot(), Figure)
+    assert isinstance(work.fitted.qualities[0].plot(), Figure)
 
 
 def test_a_prediction_shows_what_the_verdict_judges(work: Work) -> None:

@@ -19,14 +19,11 @@ STEPS = tuple(
 """Two short tests, as options of 'rig'."""
 
 
-def stages(**free: str) -> str:
-    """A fit setup: stages by their part, each with the parameters to estimate in words."""
-    text = ""
-    for part, names in free.items():
-        text += f'[[stages]]\nname = "{part}"\npart = "{part}"\n'
-        for name in names.split():
-            text += f"free.{name} = {{ relative = [0.5, 2.0], log = true }}\n"
-    return text
+def freeing(names: str, part: str = "chain") -> str:
+    """A fit setup of a part of the drive, as TOML, with the parameters to estimate in words."""
+    lines = [f'part = "{part}"']
+    lines += [f"free.{name} = {{ relative = [0.5, 2.0], log = true }}" for name in names.split()]
+    return "\n".join(lines) + "\n"
 
 
 def without_resource_warnings() -> dict[str, str]:

@@ -17,7 +17,7 @@ from math import exp
 from pathlib import Path
 
 import pytest
-from tests.cli.conftest import STEPS, stages, without_resource_warnings
+from tests.cli.conftest import STEPS, freeing, without_resource_warnings
 from tests.shown import check_shown
 
 import swashplate
@@ -27,7 +27,7 @@ from swashplate.locks import locked
 
 Words = Callable[..., str]
 CAMPAIGN = "virtual/campaign.toml"
-SETUP = stages(card="J omega_plus", pump="Z8 Z16")
+SETUP = freeing("J omega_plus Z8 Z16")
 
 
 @pytest.fixture
@@ -52,7 +52,7 @@ def test_a_campaign_becomes_a_drive(done, refused, campaign, tmp_path, monkeypat
     parts = dict(each.removesuffix(" s").rsplit(" ", 1) for each in times.split(", "))
     assert [*parts] == ["start and kernels", "reading", "search", "assessment", "report"]
     assert all(float(each) >= 0.0 for each in parts.values())
-    assert said.index("Stage card") < said.index("Stage pump")
+    assert said.index("Estimates") < said.index("Search: ")
     fitted = Drive.from_toml(tmp_path / "fitted" / "drive.toml")
     assert fitted["Z16"].value == pytest.approx((1.3e-4, 1.3e-4), rel=2e-3)
     assert fitted["J"].value == pytest.approx((0.26, 0.31), rel=2e-3)
@@ -67,9 +67,9 @@ def test_a_campaign_becomes_a_drive(done, refused, campaign, tmp_path, monkeypat
     assert parameters.title.startswith("Virtual tests")
     assert "speed at the end" in done("simulate", "fitted/drive.toml", "step:4")
     header, *rows = (tmp_path / "fitted" / "estimates.csv").read_text("utf-8").splitlines()
-    assert header.startswith("stage,parameter,unit,nominal,value,lower,upper,standard_error")
+    assert header.startswith("parameter,unit,nominal,value,lower,upper,standard_error")
     assert len([row for row in rows if "offset" not in row]) == 6
-    # the folder knows what was free: no packaged fit setup bears the drive's name
+    # the folder knows what was free
     Drive(parameters).renamed("winch").to_toml(tmp_path / "fitted" / "drive.toml")
     for named in (("fitted",), (CAMPAIGN, "--drive", "fitted/drive.toml")):
         advice = done("advise", *named, "--maneuver", "step:4", "--tests", "1")
@@ -111,7 +111,7 @@ def test_a_campaign_becomes_a_drive(done, refused, campaign, tmp_path, monkeypat
 def test_from_logs_with_a_current_to_a_drive_named_by_its_axis(
     run, done, virtual, tmp_path
 ) -> None:
-    """From neutral: the amplifier is fitted to the current first, and nothing is called neutral."""
+    """From neutral: the amplifier is fitted to the current, and nothing is called neutral."""
     logs = [str(each) for each in sorted(virtual.parent.glob("*.csv"))]
     counts = ("--counts-per-turn", "2526.315789473684")
     done("campaign", "init", *logs, "--drive", "neutral", *counts, "--out", "campaign.toml")
@@ -121,7 +121,7 @@ def test_from_logs_with_a_current_to_a_drive_named_by_its_axis(
     assert "rexroth_mdsd_1k_2x_2" in said
     result = run("fit", "campaign.toml", "--from", "start.toml", "--setup", "setup.toml")
     assert result.exit_code in (0, 1)
-    assert "no stage fits" not in result.output
+    assert "the fit setup leaves it out" not in result.output
     fitted = Drive.from_toml(tmp_path / "fitted" / "drive.toml")
     assert fitted.name == "winch"
     # of steps of one size each way the current is known there alone
@@ -130,7 +130,8 @@ def test_from_logs_with_a_current_to_a_drive_named_by_its_axis(
         currents, rel=0.02
     )
     plain = run("fit", "campaign.toml", "--out", "plain", "--no-report")
-    assert "'rectified_current' is measured, but no stage fits it" in " ".join(plain.output.split())
+    said = " ".join(plain.output.split())
+    assert "'rectified_current' is measured, but the fit setup leaves it out" in said
     assert Drive.from_toml(tmp_path / "plain" / "drive.toml").name == "winch"
 
 
@@ -152,7 +153,7 @@ def test_an_interrupted_search_goes_on(campaign: Path, tmp_path: Path, how: sign
         start_new_session=True,
     )
     deadline = time.monotonic() + 120.0
-    while not list(store.glob("card/start-*.json")):
+    while not list(store.glob("start-*.json")):
         assert running.poll() is None, "it ended before it could be interrupted"
         assert time.monotonic() < deadline
         time.sleep(0.005)
@@ -164,12 +165,11 @@ def test_an_interrupted_search_goes_on(campaign: Path, tmp_path: Path, how: sign
         assert "--resume continues" in said
         assert warnings == ""
         assert "Usable" not in said
-    assert not (store / "pump").exists()
     assert not (tmp_path / "fitted" / "drive.toml").exists()
-    kept = {path: path.stat().st_mtime_ns for path in store.glob("card/start-*.json")}
+    kept = {path: path.stat().st_mtime_ns for path in store.glob("start-*.json")}
     for words in ([*command, "fitted", "--resume"], [*command, "whole"]):
         subprocess.run([*words, "--jobs", "1"], cwd=tmp_path, capture_output=True, check=True)
-    assert len(list(store.glob("card/start-*.json"))) == 7
+    assert len(list(store.glob("start-*.json"))) == 7
     assert {path: path.stat().st_mtime_ns for path in kept} == kept
     resumed, whole = ((tmp_path / name / "drive.toml").read_text() for name in ("fitted", "whole"))
     assert resumed == whole
@@ -177,29 +177,27 @@ def test_an_interrupted_search_goes_on(campaign: Path, tmp_path: Path, how: sign
 
 @pytest.mark.slow
 def test_all_that_can_be_asked_for_besides(done: Words, campaign: Path, tmp_path: Path) -> None:
-    asked = ("--folds", "2", "--profile", "Z8", "--profile", "J_plus")
+    asked = ("--profile", "Z8", "--profile", "J_plus")
     said = done("fit", CAMPAIGN, "--setup", "setup.toml", "--jobs", "1", *asked)
-    assert "Cross-validation" in said
     assert "Fixed at their nominal values: V_dz, G1" in said
-    (ends,) = re.findall(r"^ *pump +Z8 +(.*)$", said.partition("Profile likelihoods")[2], re.M)
+    (ends,) = re.findall(r"^ *Z8 +(.*)$", said.partition("Profile likelihoods")[2], re.M)
     found = [float(each) for each in re.findall(r"\d\S*", ends)][-3:]
     assert "profile" in (tmp_path / "fitted" / "report.html").read_text("utf-8").lower()
     # in Python the same is there
     profiles = ["Z8", "J_plus"]
-    setup = tmp_path / "setup.toml"
-    result = swashplate.identify(campaign, None, setup, folds=2, profiles=profiles)
+    result = swashplate.identify(campaign, None, tmp_path / "setup.toml", profiles=profiles)
     # nearly quadratic: the profile ends where the linear interval of the noise does
     z8 = result["Z8"]
-    noise = uncertainty_of(result.fit.stage("pump")).own
+    noise = uncertainty_of(result.fit).own
     half = 1.96 * noise.standard_errors[noise.variables.names.index("Z8")]
     assert found == pytest.approx([z8.value, z8.value * exp(-half), z8.value * exp(half)], rel=0.01)
-    summary, printed = result.summary().partition("Stage card")[2], " ".join(said.split())
-    printed = printed.partition("Stage card")[2].partition("Stated error in a new maneuver")[0]
+    summary, printed = result.summary().partition("Estimates")[2], " ".join(said.split())
+    printed = printed.partition("Estimates")[2].partition("Stated error in a new maneuver")[0]
     sentences = [line for line in summary.splitlines() if re.match(r"(- |\w+: |Fixed at)", line)]
     assert len(sentences) >= 8
     assert [line for line in sentences if " ".join(line.split()) not in printed] == []
     assert printed.count(" - ") == sum(line.startswith("- ") for line in sentences)
-    titles = ("Profile likelihoods", "Runs that were fitted", "Cross-validation")
+    titles = ("Profile likelihoods", "Runs that were fitted")
     assert all(title in text for title in titles for text in (summary, printed))
 
 
@@ -215,7 +213,7 @@ def test_a_result_that_is_of_no_use_ends_with_1(run, campaign, tmp_path) -> None
     said = " ".join(result.stdout.split())
     # every value but one stands at an end of its bounds, and that one is not determined
     assert "Values: 0 of 6 may be quoted" in said
-    assert "widen J under [stages.free] of the stage 'card' and fit again." in said
+    assert "widen J under [free] of the fit setup and fit again." in said
     # whoever takes the drive along hears of it, and so do those who get the files
     said = run("export", "fitted", "--c", "folder").stdout
     assert "! The fit of this drive says: Not usable: " in said
@@ -233,14 +231,14 @@ def test_a_result_that_is_of_no_use_ends_with_1(run, campaign, tmp_path) -> None
 def test_fits_that_are_refused(refused: Words, virtual: Path, tmp_path: Path) -> None:
     (tmp_path / "setup.toml").write_text(SETUP, "utf-8")
     for words, said in (
-        ("--setup boom", "no packaged fit setup 'boom'"),
+        ("--setup boom", "'boom' is no fit setup"),
         ("--axis boom", "no axis 'boom'; it has hoist"),
         ("--setup setup.toml --profile Z99", "no parameter 'Z99'"),
     ):
         assert said in refused("fit", CAMPAIGN, *words.split())
     for old, new, said in (
         ("Z16", "Z61", "'Z61'"),
-        ("[0.5, 2.0]", "[2.0, 0.5]", "stages 1.free.J.relative"),
+        ("[0.5, 2.0]", "[2.0, 0.5]", "free.J.relative"),
         ("relative", "relativ", "'relative'"),
     ):
         (tmp_path / "bad.toml").write_text(SETUP.replace(old, new, 1), "utf-8")
@@ -323,7 +321,7 @@ def test_validations_that_are_refused(refused: Words, held_out: Path) -> None:
 
 @pytest.mark.slow
 def test_the_command_and_python_write_the_same(done: Words, held_out: Path, tmp_path: Path) -> None:
-    (tmp_path / "setup.toml").write_text(stages(card="J_plus", pump="Z10"), "utf-8")
+    (tmp_path / "setup.toml").write_text(freeing("J_plus Z10"), "utf-8")
     words = ("--setup", "setup.toml", "--profile", "Z10", "--starts", "1", "--seed", "4")
     done("fit", CAMPAIGN, *words, "--jobs", "1", "--no-report")
     result = swashplate.identify(CAMPAIGN, free="setup.toml", profiles="Z10", starts=1, seed=4)
@@ -338,7 +336,7 @@ def test_the_command_and_python_write_the_same(done: Words, held_out: Path, tmp_
 def fitted(held_out: Path, tmp_path: Path) -> Fit:
     """A fit and what it keeps of itself, in the folder fitted."""
     campaign = Campaign.from_toml(held_out)
-    setup = FitSetup.model_validate(tomllib.loads(stages(card="J_plus", pump="Z10")))
+    setup = FitSetup.model_validate(tomllib.loads(freeing("J_plus Z10")))
     found = fit(Drive.preset("hoist").parameters, campaign.select(role="fit"), setup)
     Identification(campaign, found, notes={"seed": "7"}).save(tmp_path / "fitted")
     return found
@@ -350,7 +348,7 @@ def test_the_report_is_written_again(done: Words, fitted: Fit, tmp_path: Path) -
     assert "Usable: predicts speed from counts within 0." in said
     page = (tmp_path / "fitted" / "report.html").read_text("utf-8")
     row = re.search(r"Z10</span></th>(?:<td[^>]*>[^<]*</td>){2}<td[^>]*>([^<]*)</td>", page)
-    assert float(row[1]) == pytest.approx(fitted.stages[1].values["Z10"], rel=5e-3)
+    assert float(row[1]) == pytest.approx(fitted.values["Z10"], rel=5e-3)
     assert '<th class="n">truth</th>' in page
     assert '<th scope="row">seed</th><td>7</td>' in page
     words = ("fitted/drive.toml", CAMPAIGN, "--data", "all.parquet")

@@ -124,7 +124,7 @@ def test_soundness_claims_no_more_than_was_judged(sound: Path, model: str) -> No
     assert "2 held-out runs are predicted as the fitted ones lead one to expect" in fit.verdict.data
     assert "udged" not in fit.verdict.data
 
-    none = assess_fit(fit.fit.stages, ()).data
+    none = assess_fit(fit.fit, ()).data
     assert none.endswith("none is clipped. No held-out run was judged.")
     assert "predicted" not in none
 
@@ -137,7 +137,7 @@ def test_soundness_claims_no_more_than_was_judged(sound: Path, model: str) -> No
     beyond = [
         twice(quality) if quality.experiment.name == "mixed" else quality for quality in predicted
     ]
-    some = assess_fit(fit.fit.stages, beyond).data
+    some = assess_fit(fit.fit, beyond).data
     assert "1 held-out run is predicted" in some
     assert some.endswith("Not judged, as the command goes beyond the fitted ones: mixed.")
 

@@ -6,6 +6,7 @@ import sys
 from pathlib import Path
 
 import pytest
+from tests.cli.conftest import freeing
 
 from swashplate import parameters
 
@@ -58,7 +59,7 @@ file = "measures.csv"
             ("virtual/start.toml", "virtual/truth/drive.toml", "fitted/drive.toml"), drive
         ),
         "virtual/campaign.toml": campaign,
-        "fitted/setup.toml": "stages = []\n",
+        "fitted/setup.toml": freeing("Z8"),
         "fitted/fit.json": '{"campaign": "../virtual/campaign.toml"}',
     }
     for name, text in files.items():

@@ -8,7 +8,7 @@ from html import unescape
 from pathlib import Path
 
 import pytest
-from tests.cli.conftest import stages
+from tests.cli.conftest import freeing
 
 from swashplate import Drive, analysis
 from swashplate.cli import parsing
@@ -33,13 +33,10 @@ TESTS = tuple(
 )
 """Four short tests, as options of 'rig'."""
 SETUPS = {
-    "with current": stages(card="J omega_plus", pump="Z8 Z10 Z16"),
-    "without current": '[[stages]]\nname = "chain"\npart = "chain"\n'
-    "free.Z10 = { relative = [0.5, 2.0], log = true }\n"
-    "free.Z16 = { relative = [0.5, 2.0], log = true }\n",
+    "with current": freeing("J omega_plus Z8 Z10 Z16"),
+    "without current": freeing("Z10 Z16"),
     # the search may not go where the true orifice is
-    "at a bound": stages(card="J", pump="Z8")
-    + "free.Z16 = { relative = [0.5, 1.02], log = true }\n",
+    "at a bound": freeing("J Z8") + "free.Z16 = { relative = [0.5, 1.02], log = true }\n",
 }
 
 

@@ -13,7 +13,7 @@ from pathlib import Path
 import pytest
 import scipy.io
 import typer
-from tests.cli.conftest import stages, without_resource_warnings
+from tests.cli.conftest import freeing, without_resource_warnings
 from tests.marks import rest_slow
 from typer.testing import CliRunner
 
@@ -259,7 +259,7 @@ def test_every_end_of_an_interval_is_whole(monkeypatch, capsys) -> None:
     monkeypatch.setenv("COLUMNS", "80")
     ends = ("lower 95 %", "upper 95 %", "profile lower 95 %", "profile upper 95 %")
     numbers = [Column(name, ".8g") for name in ("nominal", "estimate", *ends)]
-    made = Table("Stage pump", (Column("unknown"), UNIT, *numbers), si=True)
+    made = Table("Estimates", (Column("unknown"), UNIT, *numbers), si=True)
     values = [1651412.3, 1653987.6, 1621034.5, 1685123.4, 1633245.6, 1669765.4]
     made.add("Z8", *values, unit="m")
     made.add("an_offset_of_a_run_with_a_long_name", *(1e-6 * each for each in values), unit="m")
@@ -283,14 +283,14 @@ OF_CRANES = [*GROUP["crane"].commands.values()]
 """Their examples take minutes; tests/crane runs such commands."""
 INSTEAD = {
     "--starts 50": "--starts 1 --jobs 1",
-    "--folds 5": "--folds 2 --jobs 1",
+    "--profile Z16_plus": "--profile Z16_plus --jobs 1",
     "--out virtual": "--out new",
     "virtual-hoist/": "virtual/",
     "--run hoistr6": "--run hoist_step_4_V",
     "--from 5.8 --to 6.6": "--from 2.8 --to 3.6",
     "logs/*.csv": "logs/hoist_step_4_V.csv",
 }
-"""Draws, starts and folds, as many as a test has time for, and names that there are."""
+"""Draws and starts, as many as a test has time for, and names that there are."""
 ELSEWHERE = ("demo", "valve", "campaign init", "logs/start.toml")
 """Run by tests of their own, or by the page docs/how-to/another-machine.md."""
 
@@ -317,7 +317,7 @@ def place(tmp_path_factory: pytest.TempPathFactory) -> Path:
     for name in ("virtual", "harbour", "logs"):
         what = {"seed": 1, "validate": [] if name == "logs" else ["step 9 V"]}
         rig.write(rig.run("hoist", [*tests, maneuvers.step(9.0)], **what), folder / name)
-    (folder / "harbour" / "mine.toml").write_text(stages(card="G1 J", pump="Z8 Z10"), "utf-8")
+    (folder / "harbour" / "mine.toml").write_text(freeing("G1 J Z8 Z10"), "utf-8")
     hoist = Drive.preset("hoist")
     for name in ("mine.toml", "worn.toml"):
         hoist.scale(Z10=0.9).to_toml(folder / name)

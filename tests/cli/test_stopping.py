@@ -8,21 +8,21 @@ import time
 from pathlib import Path
 
 import pytest
-from tests.cli.conftest import STEPS, stages, without_resource_warnings
+from tests.cli.conftest import STEPS, freeing, without_resource_warnings
 from tests.marks import rest_slow
 
 from swashplate.stopping import GRACE
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="sends signals of POSIX")
 
-SETUP = stages(card="J omega_plus", pump="Z8 Z16")
+SETUP = freeing("J omega_plus Z8 Z16")
 COMMAND = [sys.executable, "-m", "swashplate"]
 PROMPT = 5.0
 """Within which a command must have ended. [s]"""
 FIT = "fit virtual/campaign.toml --setup setup.toml --out fitted --jobs {jobs}"
 COMMANDS = {
     "guess": "guess virtual/campaign.toml --out start.toml --force",
-    "fit": f"{FIT} --profile all --folds 2",
+    "fit": f"{FIT} --profile all",
     "starts": f"{FIT} --starts 6",
     "validate": "validate hoist virtual/campaign.toml --role all --out validation",
 }

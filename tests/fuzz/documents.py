@@ -35,6 +35,8 @@ LINES = (
     "# \\",
     "\x00",
     "[[runs]]",
+    "[[stages]]",
+    'stages = ["a"]',
     "=",
 )
 UNITS = ("V", "V**-0", "V^0", "0 V", "1e400 V", "V**9**9**9", "[V]", "%", "nan", "V;", "lambda")
@@ -57,15 +59,13 @@ weight = 2.0
 """
 SETUP = """
 title = "card and pump"
-[[stages]]
-name = "card"
-part = "card"
+part = "chain"
 channels = ["rectified_current"]
 start_pressure = 1e5
-[stages.free]
+[free]
 J = { relative = [0.5, 2.0], log = true }
 omega = { bounds = [1.0, 100.0], tied = true, prior = { mean = 30.0, deviation = 3.0 } }
-[stages.forces]
+[forces]
 plus = [0.1, 0.2, 0.3, 0.4]
 minus = [0.1, 0.2, 0.3, 0.4]
 [standard_uncertainty]

@@ -34,7 +34,6 @@ from swashplate import (
 )
 from swashplate.export import libraries
 from swashplate.identification import (
-    CrossValidation,
     Fit,
     FitSetup,
     Identification,
@@ -47,9 +46,7 @@ from swashplate.identification import (
     with_speeds,
 )
 from swashplate.identification.diagnostics.causes import Cause
-from swashplate.identification.resampling import Fold
 from swashplate.identification.statistics.interval_ends import Point
-from swashplate.identification.validation import Measures
 from swashplate.maneuvers import parse
 from swashplate.report.fit_report import (
     print_report,
@@ -72,11 +69,11 @@ def within(low: float, high: float, **more: object) -> dict[str, object]:
 
 # omega stands at its upper bound, which lies below the truth
 FREE = {
-    "card": {"G1": within(0.5, 2.0), "omega": within(0.5, 1.1, tied=True)},
-    "pump": {"Z10": within(0.8, 1.4)},
+    "G1": within(0.5, 2.0),
+    "omega": within(0.5, 1.1, tied=True),
+    "Z10": within(0.8, 1.4),
 }
-STAGES = [{"name": part, "part": part, "free": free} for part, free in FREE.items()]
-SETUP = FitSetup.model_validate({"title": "two stages", "stages": STAGES})
+SETUP = FitSetup.model_validate({"title": "three numbers", "free": FREE})
 
 
 @pytest.fixture(scope="module")
@@ -104,8 +101,8 @@ def judged(campaign: Campaign, fitted: Fit) -> Identification:
     """The fit with a profile, several starts and notes."""
     optimum = Point(0.0, 3.0, np.zeros(1))
     points = (Point(-0.1, 4.0, np.zeros(1)), optimum, Point(0.1, 4.5, np.zeros(1)))
-    name, ends = fitted.stages[0].problem.unknowns.names[0], ("crossed", "crossed")
-    profile = Profile(0, 3.0, points, 1.0, -0.1, 0.08, ends, None, name, "card")
+    name, ends = fitted.problem.unknowns.names[0], ("crossed", "crossed")
+    profile = Profile(0, 3.0, points, 1.0, -0.1, 0.08, ends, None, name)
     return Identification(campaign, fitted, profiles=[profile], notes=NOTES)
 
 
@@ -113,7 +110,7 @@ STARTS = tuple(
     Solution(np.zeros(1), cost, 10, number != 2, False, "done", number=number)
     for number, cost in enumerate((3.0, 3.0, 70.0, float("inf")))
 )
-HEADS = ("run", "parameter", "channel", "fold", "quantity")
+HEADS = ("run", "parameter", "channel", "quantity")
 NOTES = {"command": HOSTILE, "seed": "4"}
 
 
@@ -204,18 +201,17 @@ def number(text: str) -> float:
 @pytest.mark.slow
 def test_estimates_and_intervals_are_those_of_the_fit(read: Page, judged: Identification) -> None:
     rows = {row["name"]: row for row in read.rows("parameters")}
-    for stage in judged.fit.stages:
-        for estimate in uncertainty_of(stage).estimates:
-            if estimate.name.startswith("offset"):
-                continue
-            row = rows[estimate.name]
-            assert number(row["estimate"]) == pytest.approx(estimate.value, rel=1e-3), row
-            if estimate.lower is None:
-                assert row["lower 95 %"] == row["status"] == estimate.status
-                continue
-            half = 0.5 * (estimate.upper - estimate.lower)
-            for head, end in (("lower 95 %", estimate.lower), ("upper 95 %", estimate.upper)):
-                assert number(row[head]) == pytest.approx(end, abs=0.06 * half)
+    for estimate in uncertainty_of(judged.fit).estimates:
+        if estimate.name.startswith("offset"):
+            continue
+        row = rows[estimate.name]
+        assert number(row["estimate"]) == pytest.approx(estimate.value, rel=1e-3), row
+        if estimate.lower is None:
+            assert row["lower 95 %"] == row["status"] == estimate.status
+            continue
+        half = 0.5 * (estimate.upper - estimate.lower)
+        for head, end in (("lower 95 %", estimate.lower), ("upper 95 %", estimate.upper)):
+            assert number(row[head]) == pytest.approx(end, abs=0.06 * half)
 
 
 def test_fixed_parameters_are_listed_and_free_ones_are_not(read: Page) -> None:
@@ -231,7 +227,7 @@ def test_fixed_parameters_are_listed_and_free_ones_are_not(read: Page) -> None:
 
 
 def test_rmse_and_fit_of_a_run_are_recomputed(read: Page, fitted: Fit) -> None:
-    problem, vector = fitted.stages[0].problem, fitted.stages[0].solution.vector
+    problem, vector = fitted.problem, fitted.solution.vector
     experiment = problem.experiments[0]
     channel = experiment["current"]
     counted = channel.time >= 0.5
@@ -280,7 +276,7 @@ def test_numbers_are_packed_to_half_a_step(values: np.ndarray, step: float | Non
 
 
 def test_samples_of_a_run_are_in_the_page(read: Page, fitted: Fit) -> None:
-    experiment = fitted.stages[0].problem.experiments[0]
+    experiment = fitted.problem.experiments[0]
     channel = json.loads(read.scripts["samples-0"])["channels"][0]
     simulated, residual = map(unpacked, channel["signals"])
     np.testing.assert_allclose(unpacked(channel["time"]), experiment["current"].time, atol=2e-4)
@@ -292,7 +288,7 @@ def test_samples_of_a_run_are_in_the_page(read: Page, fitted: Fit) -> None:
 
 def test_every_sample_can_be_had_as_a_table(tmp_path: Path, judged: Identification) -> None:
     path = tmp_path / "samples.parquet"
-    write_samples(shown_runs(judged.fit.stages, judged.predicted), path)
+    write_samples(shown_runs(judged.fit, judged.predicted), path)
     table = pl.read_parquet(path)
     assert {*table["channel"]} == {"current", "counts", "speed from counts"}
     held = next(each for each in judged.predicted if each.channel == "current")
@@ -315,7 +311,7 @@ def test_a_long_run_costs_few_bytes(judged: Identification) -> None:
     channel = replace(channel, time=time, values=values, weight=np.ones(values.size))
     experiment = replace(quality.experiment, channels={quality.channel: channel})
     long = replace(quality, experiment=experiment, simulated=np.tile(quality.simulated, many))
-    (run,) = shown_runs((), [long])
+    (run,) = shown_runs(None, [long])
     data = run_data(run)
     assert len(json.dumps(data)) < 1.0 * values.size
     simulated, residual = map(unpacked, data["channels"][0]["signals"])
@@ -359,7 +355,7 @@ def test_truth_stands_beside_the_estimates(write, judged: Identification, read: 
     assert "truth" not in read.rows("parameters")[0]
     rows = {row["name"]: row for row in page.rows("parameters")}
     assert number(rows["G1_plus"]["truth"]) == pytest.approx(0.051, rel=1e-4)
-    estimates = uncertainty_of(judged.fit.stages[0]).estimates
+    estimates = uncertainty_of(judged.fit).estimates
     (estimate,) = [each for each in estimates if each.name == "G1_plus"]
     holds = estimate.lower <= 0.051 <= estimate.upper
     assert rows["G1_plus"]["holds"] == ("yes" if holds else "no")
@@ -449,21 +445,9 @@ def test_the_first_screen_says_what_would_explain_the_error(
 
 
 @pytest.mark.slow
-def test_cross_validation_has_a_section(write) -> None:
-    held = {"current": Measures(10, 0.05, 0.5)}
-    folds = tuple(Fold(number, ("a",), (), held, True) for number in range(2))
-    page = write(folds=CrossValidation(0, 2, folds, held, {"current": "A"}))
-    (row,) = page.rows("held-out")
-    assert (row["fit %"], row["RMSE held out"], row["unit"]) == ("90.00", "50", "mA")
-    assert [each[0] for each in page.tables["folds"][1:]] == ["1", "2"]
-    assert "Cross-validation" in page.words
-
-
-@pytest.mark.slow
-def test_starts_of_each_stage_are_listed(write, fitted: Fit) -> None:
-    first, second = fitted.stages
-    page = write(fit=replace(fitted, stages=(replace(first, starts=STARTS), second)))
-    assert "card: 2 of 4 starts reached the best cost, 3." in page.words
+def test_starts_are_listed(write, fitted: Fit) -> None:
+    page = write(fit=replace(fitted, starts=STARTS))
+    assert "2 of 4 starts reached the best cost, 3." in page.words
     assert "1 left the model's domain" in page.words
     listed = [row[:2] for row in page.tables["starts"][1:]]
     assert listed == [["0", "1"], ["1", "1"], ["2", "23.33333"]]
@@ -488,7 +472,7 @@ def test_a_validation_has_no_fit(validated: Path, campaign: Campaign, fitted: Fi
     roles = {row["run"]: row["role"] for row in page.rows("agreement")}
     assert roles == {each.name: each.role for each in campaign}
     predicted = predict(fitted.parameters, campaign.experiments)
-    assert assess_fit((), predicted).headline in page.words.replace("\N{NO-BREAK SPACE}", " ")
+    assert assess_fit(None, predicted).headline in page.words.replace("\N{NO-BREAK SPACE}", " ")
 
 
 @pytest.mark.slow
@@ -496,9 +480,10 @@ def test_a_page_that_cannot_be_written_leaves_the_old_one(tmp_path, write, judge
     with pytest.raises(FileError, match=r"fit\.html"):
         write_fit_report(judged, tmp_path / "none" / "fit.html")
     (tmp_path / "fit.html").write_text("old")
-    profile = Profile(0, 1.0, (), 1.0, None, None, ("open", "open"), None, "Z1", "brake")
-    with pytest.raises(InputError, match="stage 'brake'.* card, pump"):
-        write(profiles=[profile])
+    # whatever fails while the page is made
+    beyond = Profile(99, 1.0, (), 1.0, None, None, ("open", "open"), None, "Z1")
+    with pytest.raises(IndexError):
+        write(profiles=[beyond])
     assert [each.read_text() for each in tmp_path.iterdir()] == ["old"]
 
 
@@ -528,7 +513,7 @@ def test_the_page_renders_and_zooms_in_a_browser_without_errors(
     # the values where the pointer is are those of the run
     said = re.search(r'class="readout">([\d.]+) s · .*? measured current (\S+) (m?A) ·', made)
     assert said is not None
-    channel = fitted.stages[0].problem.experiments[0]["current"]
+    channel = fitted.problem.experiments[0]["current"]
     value = float(said[2].replace("−", "-")) * (1e-3 if said[3] == "mA" else 1.0)
     row = int(np.searchsorted(channel.time, float(said[1])))
     assert value == pytest.approx(float(channel.values[row]), abs=5e-4)

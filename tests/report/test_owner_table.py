@@ -54,10 +54,9 @@ def fitted(
     guess = guess_drive(runs)
     start = guessed_set(guess, "campaign.toml")
     setup = FitSetup(**tomllib.loads(guessed_fit_setup(guess, start)))
-    (stage,) = setup.stages
-    free = {name: entry for name, entry in stage.free.items() if name not in without}
+    free = {name: entry for name, entry in setup.free.items() if name not in without}
     free |= {name: Free(bounds=pair) for name, pair in bounds.items()}
-    setup = setup.model_copy(update={"stages": (stage.model_copy(update={"free": free}),)})
+    setup = setup.model_copy(update={"free": free})
     if without:
         start = start.replace(dict.fromkeys(without, inf))
     start = start.replace({name: sum(pair) / 2.0 for name, pair in bounds.items()})
@@ -139,8 +138,7 @@ def test_an_estimate_at_its_bound_keeps_its_interval_and_is_named(
 ) -> None:
     """A dead zone of 0.6 V that the search was not allowed, and what it decides."""
     result = fitted(runs, bounds={"V_dz_minus": bounds})
-    (stage,) = result.stages
-    assert "V_dz_minus" in identifiability_of(stage).at_bounds
+    assert "V_dz_minus" in identifiability_of(result).at_bounds
     numbers = key_numbers(result)
     for number in numbers.numbers:
         assert number.name in ("jump", "creep") or None not in number.interval, number.label
@@ -156,19 +154,17 @@ def test_an_estimate_at_its_bound_keeps_its_interval_and_is_named(
 @pytest.mark.slow
 def test_a_spread_is_that_of_the_covariance(found: Fit) -> None:
     """Of the dead zone it is that of V_dz, as the jump is none: own errors and systematic ones."""
-    (stage,) = found.stages
 
     def dead_zones(drive: Drive) -> np.ndarray:
         return np.array([drive.parameters.numbers[f"V_dz_{way}"] for way in WAYS])
 
-    spread = spread_of(found.stages, dead_zones)
+    spread = spread_of(found, dead_zones)
     errors = np.array([found[f"V_dz_{way}"].standard_error for way in WAYS])
     # and what assumed parameters add
     assert (spread.half >= 1.96 * errors).all()
     assert spread.half == pytest.approx(1.96 * errors, rel=0.05)
     assert not spread.below.any()
     assert not spread.above.any()
-    assert stage.stage.name == "drive"
 
 
 @pytest.mark.slow
@@ -181,7 +177,7 @@ def test_a_way_that_no_run_goes_has_no_interval(runs: list[Experiment]) -> None:
 
 @pytest.mark.slow
 def test_a_limit_that_the_model_has_not_is_not_called_unreached(found: Fit) -> None:
-    said = assess_fit(found.stages, predict(found.parameters, found.runs)).validity
+    said = assess_fit(found, predict(found.parameters, found.runs)).validity
     reached, _, lacking = said.partition("not in the model")
     assert "Z14" in lacking
     assert "Z15" in lacking
@@ -197,7 +193,7 @@ def test_what_a_guess_did_not_see_is_looked_for(runs: list[Experiment], tmp_path
     start = guessed_set(guess, "campaign.toml")
     assert start.unreached.keys() == {"Z13_plus", "Z16_plus"}
     setup = FitSetup(**tomllib.loads(guessed_fit_setup(guess, start)))
-    assert {"Z13_plus", "Z16_plus"} <= setup.stages[0].free.keys()
+    assert {"Z13_plus", "Z16_plus"} <= setup.free.keys()
     # where it starts the limits act under the largest command
     run = Drive(start).simulate(maneuvers.step(8.0))
     assert run.active("swash_stop").any()

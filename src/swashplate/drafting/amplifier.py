@@ -2,17 +2,17 @@
 
 What a control card does between command and current is, each way, a dead zone, a jump at its edge
 and a gain; and a filter, which on some cards has a limited rate. `guess_amplifier` reads the former
-off settled currents and takes the latter from whichever packaged card, or plain filter, follows the
-logs best.
+off settled currents, and tries forms of the latter: plain filters, lags with a limited rate
+each way, and those of the packaged cards. All numbers of the best are fitted to the currents.
 
-The constants are judgement: they are the grids of a coarse search, from whose best point a fit
+The constants are judgement: they are the grids of a coarse search, from whose best points a fit
 begins. Only a guess depends on them.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from math import inf, pi
+from math import inf, isfinite, pi, sqrt
 from typing import NamedTuple
 
 import numpy as np
@@ -20,8 +20,10 @@ from numpy.typing import NDArray
 
 from swashplate.campaign import CURRENTS, Channel, Experiment
 from swashplate.drive import Drive
-from swashplate.errors import InputError
-from swashplate.parameters import ParameterSet, preset_names
+from swashplate.errors import InputError, SwashplateError
+from swashplate.identification import FitSetup, solve
+from swashplate.identification.estimation import Free, joined, problem_of, smooth
+from swashplate.parameters import SIDES, ParameterSet, preset_names
 from swashplate.results import short
 from swashplate.tables import UNIT, Cell, Column, Table
 
@@ -55,6 +57,22 @@ SCALED = ("C", "lim1", "lim2", "I_t1", "I_t2")
 """Those of them that are proportional to the size of the current."""
 WEAK_SOLENOIDS = 1e-3
 """Z19 of the simulations: at no current do solenoids this weak overpower the feedback spring."""
+LAGS = (0.005, 0.015, 0.05)
+"""Lags of the filters with a limited rate that are tried. [s]"""
+OVERDAMPED = 2.0
+"""Damping of these: they are lags of first order, but for a much shorter one."""
+RATE_WINDOW = 0.04
+"""Time over which rates of a current are taken. [s]"""
+FASTEST = 0.9
+"""Quantile of a current's rates above half of the largest one, near which a limit would lie. [1]"""
+SIMPLER = 1.05
+"""A filter without limits is taken unless its error is so many times as large. [1]"""
+EVALUATIONS, TOLERANCE = 40, 1e-4
+"""Of the fit of a form."""
+STATIC_FACTOR, DYNAMIC_FACTOR = 2.0, 10.0
+"""By which it may change a number of the settled current, and one of the dynamics. [1]"""
+LONGEST_DELAY = 0.1
+"""Up to which it may always go. [s]"""
 SCALED_AT = 10.0
 """Command beyond the dead zone at which sizes of currents are compared: a card's full range. [V]"""
 
@@ -141,15 +159,17 @@ def guess_amplifier(experiments: Sequence[Experiment]) -> AmplifierGuess | None:
         "J": (plus.jump, minus.jump),
         "G1": (plus.gain, minus.gain),
     }
-    trials = (_try_dynamics(measured, static, dynamics) for dynamics in _dynamics(static))
-    best = min(trials, key=lambda trial: trial.error)
+    tried = seen_plus is not None, seen_minus is not None
+    trials = [_try_dynamics(measured, static, dynamics) for dynamics in _forms(measured, static)]
+    trial = min(trials, key=lambda trial: trial.error * (1.0 if trial.is_plain else SIMPLER))
+    best = _fitted_form(measured, static, trial, tried)
     currents = np.concatenate([reading.current for reading in measured])
     return AmplifierGuess(
-        dead_zone=static["V_dz"],
-        jump=static["J"],
-        gain=static["G1"],
-        dynamics=best.dynamics.numbers,
-        card=best.dynamics.card,
+        dead_zone=best.numbers["V_dz"],
+        jump=best.numbers["J"],
+        gain=best.numbers["G1"],
+        dynamics={symbol: best.numbers[symbol] for symbol in DYNAMIC},
+        card=best.card,
         delay=best.delay,
         command=(
             seen_plus.command if seen_plus else 0.0,
@@ -257,19 +277,72 @@ class _DynamicsTrial(NamedTuple):
     error: float
     """RMS. [A]"""
 
+    @property
+    def is_plain(self) -> bool:
+        """Whether it is a filter without a limited rate."""
+        return not isfinite(self.dynamics.numbers["lim1"][0])
 
-def _dynamics(static: Mapping[str, PlusMinus]) -> Iterator[_Dynamics]:
-    """Dynamics to try: of plain filters, and of each packaged card, for currents of this size."""
+
+def _forms(measured: Sequence[_Currents], static: Mapping[str, PlusMinus]) -> Iterator[_Dynamics]:
+    """Dynamics to try: plain filters, lags with a limited rate each way, each packaged card.
+
+    The last for currents of the size that settled ones have.
+    """
     plain = Drive.preset("neutral").at_every_rate().parameters
     unlimited = {symbol: _plus_minus(plain, symbol) for symbol in DYNAMIC}
     for omega in NATURAL_FREQUENCIES:
         yield _Dynamics("", {**unlimited, "zeta": (1.0, 1.0), "omega": (omega, omega)})
+    rates = _largest_rates(measured, static)
+    if rates is not None:
+        for lag in LAGS:
+            yield _Dynamics("", {**unlimited, **_limited(lag, rates, static)})
     cards = {plain.card}
     for name in preset_names():
         packaged = Drive.preset(name).at_every_rate().parameters
         if packaged.card not in cards:
             cards.add(packaged.card)
             yield _Dynamics(packaged.card, _scaled_dynamics(packaged, static))
+
+
+def _limited(
+    lag: float, rates: tuple[float, float], static: Mapping[str, PlusMinus]
+) -> dict[str, PlusMinus]:
+    """Dynamics of a current that jumps at once, and has a limited rate beyond its jump."""
+    omega = (OVERDAMPED + sqrt(OVERDAMPED**2 - 1.0)) / lag
+    rising, falling = rates
+    return {
+        "zeta": (OVERDAMPED, OVERDAMPED),
+        "omega": (omega, omega),
+        "lim1": (rising, rising),
+        "lim2": (falling, falling),
+        "I_t1": static["J"],
+        "I_t2": static["J"],
+        "a": (1.0 / lag, 1.0 / lag),
+    }
+
+
+def _largest_rates(
+    measured: Sequence[_Currents], static: Mapping[str, PlusMinus]
+) -> tuple[float, float] | None:
+    """Rates of rising and falling beyond the jump that a limit would hold; None without. [A/s]"""
+    changes = list[Array]()
+    for reading in measured:
+        jump = min(static["J"][side] for side in reading.sides)
+        interval = float(np.median(np.diff(reading.time)))
+        rows = max(round(RATE_WINDOW / interval), 1)
+        first, last = reading.current[:-rows], reading.current[rows:]
+        beyond = np.minimum(first, last) > jump
+        passed = reading.time[rows:] - reading.time[:-rows]
+        changes.append(((last - first) / passed)[beyond])
+    rates = np.concatenate([np.zeros(0), *changes])
+    largest = [float((sign * rates).max(initial=0.0)) for sign in (1.0, -1.0)]
+    if not min(largest) > 0.0:
+        return None
+    rising, falling = (
+        float(np.quantile(sizes[sizes > 0.5 * most], FASTEST))
+        for sizes, most in zip((rates, -rates), largest, strict=True)
+    )
+    return rising, falling
 
 
 def _scaled_dynamics(
@@ -298,27 +371,88 @@ def _plus_minus(parameters: ParameterSet, symbol: str) -> PlusMinus:
 
 
 def _try_dynamics(
-    measured: Sequence[_Currents], static: Mapping[str, PlusMinus], dynamics: _Dynamics
+    measured: Sequence[_Currents],
+    static: Mapping[str, PlusMinus],
+    dynamics: _Dynamics,
+    delays: Array = DELAYS,
 ) -> _DynamicsTrial:
-    """Simulate the currents with some dynamics; the delay and error of the least squares.
+    """Simulate the currents with some dynamics; of some delays [s] the best, and its error.
 
     The error is infinite if the card refuses a command.
     """
     neutral = Drive.preset("neutral").at_every_rate().parameters
     drive = Drive(neutral.with_numbers({"Z19": WEAK_SOLENOIDS, **static, **dynamics.numbers}))
-    squares = np.zeros(DELAYS.size)
+    squares = np.zeros(delays.size)
     size = 0
     try:
         for reading in measured:
             time, simulated = _simulated_current(drive, reading)
-            for k, delay in enumerate(DELAYS):
+            for k, delay in enumerate(delays):
                 residual = np.interp(reading.time - delay, time, simulated) - reading.current
                 squares[k] += float(residual @ residual)
             size += reading.time.size
     except InputError:  # a command beyond what a card takes, or a filter too fast for the step
         return _DynamicsTrial(dynamics, 0.0, inf)
     best = int(np.argmin(squares))
-    return _DynamicsTrial(dynamics, float(DELAYS[best]), float(np.sqrt(squares[best] / size)))
+    return _DynamicsTrial(dynamics, float(delays[best]), float(np.sqrt(squares[best] / size)))
+
+
+class _FittedForm(NamedTuple):
+    """A form whose numbers were fitted to the currents."""
+
+    card: str
+    numbers: dict[str, PlusMinus]
+    """Static ones and those of the dynamics, by symbol. [SI]"""
+    delay: float
+    """[s]"""
+    error: float
+    """RMS. [A]"""
+
+
+def _fitted_form(
+    measured: Sequence[_Currents],
+    static: Mapping[str, PlusMinus],
+    trial: _DynamicsTrial,
+    tried: tuple[bool, bool],
+) -> _FittedForm:
+    """All numbers of a form by least squares from a trial of it; the trial if that fails.
+
+    Numbers of a way that was not tried are the other's.
+    """
+    numbers: dict[str, PlusMinus] = {**static, **trial.dynamics.numbers}
+    as_tried = _FittedForm(trial.dynamics.card, numbers, trial.delay, trial.error)
+    if not isfinite(trial.error):
+        return as_tried
+    base = Drive.preset("neutral").at_every_rate().parameters
+    start = base.with_numbers({"Z19": WEAK_SOLENOIDS, **numbers, "tau": trial.delay})
+    free = {"tau": Free(bounds=(0.0, max(2.0 * trial.delay, LONGEST_DELAY)))}
+    for symbol, pair in numbers.items():
+        factor = STATIC_FACTOR if symbol in static else DYNAMIC_FACTOR
+        for side, number, is_tried in zip(SIDES, pair, tried, strict=True):
+            if is_tried and number > 0.0 and isfinite(number):
+                free[f"{symbol}_{side}"] = Free(relative=(1.0 / factor, factor), log=True)
+    runs = {id(reading.experiment): reading.experiment for reading in measured}
+    unsettled = [run for run in runs.values() if not run.input.settled]
+    jumping = {id(run): joined([run], "jumps")[0] for run in unsettled}
+    try:
+        problem = problem_of(
+            FitSetup(part="card", free=free),
+            smooth(start),
+            [jumping.get(key, run) for key, run in runs.items()],
+        )
+        found = solve(problem, tolerance=TOLERANCE, max_evaluations=EVALUATIONS)
+    except SwashplateError:
+        return as_tried
+    values = problem.unknowns.values(found.vector)
+    for symbol, (plus, minus) in numbers.items():
+        plus, minus = values.get(f"{symbol}_plus", plus), values.get(f"{symbol}_minus", minus)
+        if not all(tried):
+            plus, minus = (plus, plus) if tried[0] else (minus, minus)
+        numbers[symbol] = plus, minus
+    dynamics = _Dynamics(trial.dynamics.card, {symbol: numbers[symbol] for symbol in DYNAMIC})
+    static_found = {symbol: numbers[symbol] for symbol in static}
+    end = _try_dynamics(measured, static_found, dynamics, np.array([values["tau"]]))
+    return _FittedForm(trial.dynamics.card, numbers, values["tau"], end.error)
 
 
 def _simulated_current(drive: Drive, reading: _Currents) -> tuple[Array, Array]:

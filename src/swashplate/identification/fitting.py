@@ -22,6 +22,7 @@ from swashplate.drive import Drive
 from swashplate.errors import InputError, UnknownNameError
 from swashplate.executors import Executor, Serial
 from swashplate.identification import tables
+from swashplate.identification.contradiction import less_of_currents, with_weight_of_currents
 from swashplate.identification.diagnostics.data_checks import (
     check_model,
     check_rank,
@@ -51,7 +52,13 @@ from swashplate.identification.estimation.solving import (
     solve,
     solve_from,
 )
-from swashplate.identification.lateness import is_in_question, lateness_of, with_lateness
+from swashplate.identification.jump import first_jumps, unseen_jumps, with_jumps
+from swashplate.identification.lateness import (
+    is_in_question,
+    is_whole_drive,
+    lateness_of,
+    with_lateness,
+)
 from swashplate.identification.optimum import Optimum
 from swashplate.identification.statistics.intervals import Estimate, weighed
 from swashplate.machine import Model as Equations
@@ -85,10 +92,10 @@ WINDOW = 1.0
 CLIFFS = 2
 """How often such a search goes on where the cost jumps: where a dead zone passes a level of a
 staircase."""
-WITH_PRIORS = 1e-8
+WITH_PRIORS = 1e-6
 """Tolerance of a search in which every number has a prior: what changes the cost by less lies along
 directions that only these hold."""
-BEFORE_WEIGHING = 1e-6
+BEFORE_WEIGHING = 1e-4
 """And of the one before it is known what the residuals are worth."""
 FAR = 3.0
 """Deviations beyond which a number is not like that of the named drive: by chance one of 40 is in a
@@ -296,7 +303,13 @@ def fit(
     nominal, setup = stated.nominal, stated.setup
     doubts += stated.doubts
 
-    def solved(setup: FitSetup, start_at: Mapping[str, float]) -> Fit:
+    def found(setup: FitSetup, solved: _Solved) -> Fit:
+        """The fit that a solution of the problem of a setup makes."""
+        problem, solution, starts = solved
+        parameters = with_estimates(smooth(nominal), problem, solution.vector)
+        return Fit(setup, nominal, tuple(runs), problem, solution, parameters, starts)
+
+    def searched(setup: FitSetup, near: Mapping[str, float]) -> Fit:
         """The optimum for a fit setup, from some values if they are given."""
         problem = problem_of(setup, smooth(nominal), runs, threads=threads)
         refuse_unsound(check_rank("The fit", problem), InputError)
@@ -311,34 +324,76 @@ def fit(
             start = None
             if setup.has_spreads:
                 limits |= {"tolerance": max(tolerance, WITH_PRIORS), "cliffs": CLIFFS}
-                start = problem.unknowns.vector_of(start_at) if start_at else None
+                start = problem.unknowns.vector_of(near) if near else None
             solver = partial(solve, loss=loss, watch=seen, keep_best=True, **limits)
-            problem, solution, starts = _solved(setup, problem, solver, search, doubts, start)
+            solved = _solved(setup, problem, solver, search, doubts, start)
         LOGGER.info(
             "Search: %s after %d evaluations, cost %.5g",
-            solution.message,
-            solution.evaluations,
-            solution.cost,
+            solved.solution.message,
+            solved.solution.evaluations,
+            solved.solution.cost,
         )
-        return Fit(
-            setup=setup,
-            nominal=nominal,
-            runs=tuple(runs),
-            problem=problem,
-            solution=solution,
-            parameters=with_estimates(smooth(nominal), problem, solution.vector),
-            starts=starts,
-        )
+        return found(setup, solved)
+
+    def rough(setup: FitSetup, near: Mapping[str, float], first: Mapping[str, float]) -> Fit:
+        """A fit that ends where a step changes the cost by less than `ROUGH` of itself.
+
+        From some values, or from where a search with a larger unit of residual ended, some numbers
+        of it elsewhere.
+        """
+        problem = problem_of(setup, smooth(nominal), runs, threads=threads)
+        begin = near or problem.unknowns.values(approached(problem, loss=loss))
+        start = problem.unknowns.vector_of({**begin, **first})
+        solution = solve(problem, start, loss=loss, tolerance=ROUGH, keep_best=True)
+        if not solution.interrupted:
+            problem = weighed(problem, solution.vector)
+        return found(setup, _Solved(problem, solution))
 
     with working(f"Fitting {nominal.name}"):
         settled = settle(runs, smooth(nominal), setup, loss=loss, threads=threads)
         runs = settled.runs
         doubts += settled.sentences
-        result = solved(setup, settled.near)
-        late = lateness_of(result, smooth(nominal)) if is_in_question(setup, nominal) else {}
-        if late:
-            result = solved(with_lateness(setup), result.values | late)
+        near, interrupted = settled.near, None
+        if is_whole_drive(setup, nominal):
+            with working("Searching roughly"):
+                setup, near, interrupted = _asked_for(setup, nominal, near, rough)
+        result = interrupted or searched(setup, near)
     return replace(result, doubts=(*doubts, *_unlike(result)))
+
+
+class _Asked(NamedTuple):
+    """A setup of a whole drive with what the runs ask for beyond it."""
+
+    setup: FitSetup
+    near: Mapping[str, float]
+    """Values near the optimum by the unknowns' labels; none if unknown."""
+    interrupted: Fit | None = None
+    """A rough fit that was interrupted."""
+
+
+def _asked_for(
+    setup: FitSetup,
+    nominal: Parameters,
+    near: Mapping[str, float],
+    rough: Callable[[FitSetup, Mapping[str, float], Mapping[str, float]], Fit],
+) -> _Asked:
+    """What runs ask for: jumps, a lateness behind the current, and currents that count less."""
+    currents = unseen_jumps(nominal)
+    if currents:
+        setup = with_jumps(setup, currents)
+    fit = rough(setup, near, first_jumps(currents))
+    if fit.interrupted:
+        return _Asked(setup, near, fit)
+    late = lateness_of(fit) if is_in_question(setup, fit.parameters) else {}
+    if late:
+        setup = with_lateness(setup)
+        fit = rough(setup, fit.values | late, {})
+        if fit.interrupted:
+            return _Asked(setup, near, fit)
+    freed = less_of_currents(fit)
+    if freed is None:
+        return _Asked(setup, fit.values)
+    return _Asked(with_weight_of_currents(setup, freed.factor), freed.values)
 
 
 def _unlike(fit: Optimum) -> Iterator[str]:

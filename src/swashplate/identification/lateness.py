@@ -12,6 +12,7 @@ from dataclasses import replace
 import numpy as np
 
 from swashplate.errors import DomainError
+from swashplate.identification.estimation.drive_model import DriveModel
 from swashplate.identification.estimation.fit_problem import Parameters, problem_of
 from swashplate.identification.estimation.setup import FitSetup, Free
 from swashplate.identification.estimation.unknowns import Prior
@@ -19,8 +20,11 @@ from swashplate.identification.optimum import Optimum
 from swashplate.parameters import ParameterSet
 
 LATE = ("solenoid_delay", "solenoid_lag")
-USUAL = 0.03
-"""Standard deviation of each beforehand, about 0: proportional valves take 10 to 60 ms. [s]"""
+USUAL = {"solenoid_delay": 0.05, "solenoid_lag": 0.1}
+"""Standard deviation of each beforehand, about 0: proportional valves take 10 to 60 ms, and of what
+follows them, which may be as slow as the pump, the lag is all that stands for it. [s]"""
+FIRST = 0.03
+"""At most where a search begins. [s]"""
 LARGEST = 0.5
 """[s]"""
 MATTERS = 0.003
@@ -29,30 +33,36 @@ EXPLAINS = 0.002
 """Part of the cost that they must explain, others following: next to nothing is chance."""
 
 
+def is_whole_drive(setup: FitSetup, nominal: Parameters) -> bool:
+    """Whether a setup takes the whole of a drive by its priors."""
+    return isinstance(nominal, ParameterSet) and setup.has_spreads and setup.part == "chain"
+
+
 def is_in_question(setup: FitSetup, nominal: Parameters) -> bool:
     """Whether a setup takes the whole of a drive by its priors, and nobody stated a lateness."""
-    return (
-        isinstance(nominal, ParameterSet)
-        and setup.has_spreads
-        and setup.part == "chain"
-        and not any(name in setup.free or nominal.numbers.get(name) for name in LATE)
+    return is_whole_drive(setup, nominal) and not any(
+        name in setup.free or nominal.numbers.get(name) for name in LATE
     )
 
 
 def with_lateness(setup: FitSetup) -> FitSetup:
     """The setup with a delay and a lag between current and spool, known to be near 0."""
-    free = Free(bounds=(0.0, LARGEST), prior=Prior(0.0, USUAL))
-    return setup.model_copy(update={"free": {**setup.free, **dict.fromkeys(LATE, free)}})
+    free = {
+        name: Free(bounds=(0.0, LARGEST), prior=Prior(0.0, usual)) for name, usual in USUAL.items()
+    }
+    return setup.model_copy(update={"free": {**setup.free, **free}})
 
 
-def lateness_of(fit: Optimum, nominal: Parameters) -> dict[str, float]:
+def lateness_of(fit: Optimum) -> dict[str, float]:
     """Delay and lag that the runs ask for, to begin a search at; none if they ask for none. [s]
 
     By one step of Gauss and Newton from where the fit ended, of all numbers with both beside them:
     their sum must matter, and the step must take a part of the cost away.
     """
+    model = fit.problem.model
+    assert isinstance(model, DriveModel)
     late = with_lateness(fit.setup)
-    problem = problem_of(late, nominal, fit.runs, threads=fit.problem.threads)
+    problem = problem_of(late, model.parameters, fit.runs, threads=fit.problem.threads)
     fitted = fit.problem.unknowns
     worths = [unknown.worth for unknown in fitted if unknown.prior is not None]
     usual = float(np.median(worths)) if worths else 1.0
@@ -72,5 +82,5 @@ def lateness_of(fit: Optimum, nominal: Parameters) -> dict[str, float]:
     if sizes.sum() < MATTERS or left > (1.0 - EXPLAINS) * squares:
         return {}
     # a search that begins at a bound stays there
-    begin = np.clip(sizes, MATTERS, USUAL).tolist()
+    begin = np.clip(sizes, MATTERS, FIRST).tolist()
     return dict(zip(LATE, begin, strict=True))

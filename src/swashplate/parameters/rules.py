@@ -80,11 +80,6 @@ RULE_AT_REST = ParameterRule(
 )
 SIDE_RULES: tuple[ParameterRule, ...] = (
     ParameterRule(
-        lambda n: n["I_t2"] >= n["I_t1"],
-        "I_t2_{side} is {I_t2:g} A, but must be below I_t1_{side} = {I_t1:g} A: the decay begins "
-        "at a lower current than the rate limit.",
-    ),
-    ParameterRule(
         lambda n: n["arm_sine"] >= 1.0,
         "Z3·tan Z13_{side} is {arm_sine:.4g}, but must be below 1: at its stop of {Z13:g} rad the "
         "swash plate would turn the feedback arm past 90°.",
@@ -156,8 +151,6 @@ def check_rules(
     for k, side in enumerate(SIDES):
         side_values = {
             "side": side,
-            "I_t1": values[f"I_t1_{side}"],
-            "I_t2": values[f"I_t2_{side}"],
             "Z13": values[f"Z13_{side}"],
             "arm_sine": values["Z3"] * np.tan(values[f"Z13_{side}"]),
             "lowest": extremes.lowest_current[:, k],

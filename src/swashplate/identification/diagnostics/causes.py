@@ -47,6 +47,8 @@ BLOCK = 0.05
 TRIED, NAMED = 5, 3
 """Causes that are tried by a refit, those first that explain most to first order; and that are
 named at most."""
+WORTH_TRYING = 0.2
+"""Part that a cause must remove to first order to be tried: half of it may lie in the curvature."""
 TOLERANCE, FEWEST_EVALUATIONS, MOST_EVALUATIONS = 1e-6, 6, 30
 """Of a refit, which begins at the optimum without the cause."""
 WORK = 20_000_000
@@ -127,7 +129,9 @@ def causes_of(fit: Optimum) -> tuple[Cause, ...] | None:
     if original_squares.noise_share >= EXPLAINED:
         return None
     plausible = [
-        score for score in _scores(fit) if score.candidate.least < score.size < score.candidate.most
+        score
+        for score in _scores(fit)
+        if score.candidate.least < score.size < score.candidate.most and score.share > WORTH_TRYING
     ]
     plausible.sort(key=lambda score: -score.share)
     causes = list[Cause]()

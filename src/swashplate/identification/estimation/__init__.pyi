@@ -1,10 +1,13 @@
+from .between_samples import joined as joined
 from .drive_model import LIMIT_COLUMNS as LIMIT_COLUMNS
 from .drive_model import at_rate_of as at_rate_of
 from .drive_model import limits_unreached as limits_unreached
 from .drive_model import voltage_record as voltage_record
 from .fit_problem import Parameters as Parameters
+from .fit_problem import problem_of as problem_of
 from .fit_problem import setup_of as setup_of
 from .fit_problem import smooth as smooth
 from .model import states_started_by as states_started_by
 from .model_setup import loaded_module as loaded_module
 from .setup import Forces as Forces
+from .setup import Free as Free

@@ -69,6 +69,11 @@ LIKE_NAMED = 0.3
 """How near a machine's numbers are taken to be to those of the drive that is named for it, a
 standard deviation of their logarithms: what differs between machines of a kind is not known, so
 this is wide. [1]"""
+READ_OFF = 0.7
+"""The same of a number that a guess read off logs, in which a lag can stand for a limit. [1]"""
+CERTAIN = 0.009
+"""Interval between the samples of an edge up to which its instant is no unknown among numbers that
+have priors: 125 samples a second. [s]"""
 LARGEST_START_PRESSURE = 4e6
 """Bound of a free pressure at the start if the fit setup gives none. [Pa]"""
 
@@ -216,7 +221,8 @@ def whole_drive(
     parameters : ParameterSet
         The drive that the machine is like.
     spread : float
-        Standard deviation of a number, as a share of its nominal value. [1]
+        Standard deviation of a number, as a share of its nominal value; at least `READ_OFF` of one
+        that a guess read off logs. [1]
     part : {"chain", "pump"}
         The whole drive, or pump and motor without their amplifier.
 
@@ -236,9 +242,15 @@ def whole_drive(
             if number != 0.0 and np.isfinite(number)
         ]
         names = [symbol] if len(moved) == len(parameter.numbers) else moved
-        free |= {name: Free(spread=spread) for name in names}
+        known = max(spread, READ_OFF) if is_read_off(parameters, symbol) else spread
+        free |= {name: Free(spread=known) for name in names}
     title = f"every number of {parameters.name}, known to within {100.0 * spread:g} %"
     return FitSetup(title=title, part=part, free=free)
+
+
+def is_read_off(parameters: ParameterSet, symbol: str) -> bool:
+    """Whether a guess read a parameter off the logs of tests."""
+    return parameters.tested is not None and parameters[symbol].status == "approximate"
 
 
 def problem_of(
@@ -272,7 +284,7 @@ def problem_of(
         unknowns += _of_a_run(setup, run, channels, parameters)
     if setup.part != "pump" or setup.current != "measured":
         edges = [unknown for run in runs for unknown in unknown_instants(run)]
-        if len(edges) <= MOST_EDGES:
+        if len(edges) <= MOST_EDGES and not _edges_are_certain(setup, runs):
             unknowns += edges
     return Problem(
         model,
@@ -289,6 +301,16 @@ def problem_of(
         ),
         threads=threads,
     )
+
+
+def _edges_are_certain(setup: FitSetup, runs: Sequence[Experiment]) -> bool:
+    """Whether the instants of the command's edges, halfway between samples, are certain enough.
+
+    A fit that grants every model an error of 1 % of the range does not see by which part of a short
+    interval they are off, some earlier and some later.
+    """
+    intervals = [edge.interval for run in runs for edge in run.input.edges]
+    return setup.has_spreads and float(np.median(intervals or [0.0])) <= CERTAIN
 
 
 def _currents(

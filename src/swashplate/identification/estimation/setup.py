@@ -230,7 +230,7 @@ class FitSetup(Document):
             raise ValueError(
                 "a fit has no stages any more: write each into a file of its own, without "
                 "[[stages]], and fit them one after another, each --from the folder of the one "
-                "before; or leave out --setup, and all numbers are fitted at once"
+                "before; or go without a fit setup, and all numbers are fitted at once"
             )
         others = {key: value for key, value in content.items() if key != "stages"}
         return others | {key: value for key, value in single.items() if key != "name"}

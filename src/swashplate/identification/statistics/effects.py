@@ -120,7 +120,8 @@ def changes_of(experiment: Experiment, resolution: float) -> Iterator[Change]:
     deviation is 1/√3 of them (JCGM 100:2008, 4.3.7). The zero of a command is another one in each
     run, because the converter rounds each of its levels again. What a command does between samples
     is known to half of the time between them: the instant of a jump, or when a staircase that looks
-    like a ramp passes a threshold.
+    like a ramp passes a threshold. A reading with noise passes a threshold before the command does,
+    by about the standard deviation of the noise, in all runs and both ways.
     """
     command, run = experiment.input, experiment.name
     accuracy = command.instrument
@@ -131,14 +132,19 @@ def changes_of(experiment: Experiment, resolution: float) -> Iterator[Change]:
         yield Change(f"instant of the command{IN_RUN}{run}", replace(experiment, input=later))
     steps = resolution / sqrt(12.0) if accuracy.rounded else 0.0
     zero = hypot(accuracy.zero / sqrt(3.0), steps)
+    # a card takes no more than its full voltage, which a command may have reached
+    largest = float(np.abs(command.values).max())
     if zero > 0.0:
-        # a card takes no more than its full voltage, which a command may have reached
-        largest = float(np.abs(command.values).max())
         shifted = np.clip(command.values + SMALL * zero, -largest, largest)
         shifted_command = replace(command, values=shifted)
         yield Change(
             f"zero of the command{IN_RUN}{run}", replace(experiment, input=shifted_command), SMALL
         )
+    noise = _noise(command.values)
+    if noise > 0.0:
+        noisier = command.values + SMALL * noise * np.sign(command.values)
+        noisy_command = replace(command, values=np.clip(noisier, -largest, largest))
+        yield Change("noise of the command", replace(experiment, input=noisy_command), SMALL)
     if accuracy.gain > 0.0:
         weaker = replace(command, values=command.values * (1.0 - accuracy.gain / sqrt(3.0)))
         yield Change("gain of the command", replace(experiment, input=weaker))
@@ -155,6 +161,13 @@ def changes_of(experiment: Experiment, resolution: float) -> Iterator[Change]:
         for what, reading in readings.items():
             channels = {**experiment.channels, name: reading}
             yield Change(f"{what} of {name}", replace(experiment, channels=channels))
+
+
+def _noise(values: Array) -> float:
+    """Standard deviation of white noise in (n,) readings; 0 of those that are mostly equal."""
+    # 20 = 1 + 9 + 9 + 1, of the squares of a third difference
+    differences = np.abs(np.diff(values, 3))
+    return float(np.median(differences)) / (0.6745 * sqrt(20.0)) if differences.size else 0.0
 
 
 def after_play(values: Array, width: float) -> Array:
