@@ -1,6 +1,7 @@
 """Identification: unknowns of a model found from a campaign, and how well they are known.
 
-A fit takes `estimation` for its problem and search, `statistics` for intervals, `diagnostics` for the verdict.
+A fit takes `estimation` for its problem and search, `statistics` for intervals, `diagnostics` for
+the verdict.
 """
 
 import lazy_loader

@@ -253,6 +253,8 @@ NEIGHBOURS, LEAST_LEFT = 21, 0.1
 part of them that the fit must have left for the noise to be known there."""
 TOGETHER = 8
 """Directions whose spectra are taken together."""
+ROUNDING = 1e-9
+"""Relative growth of a variance that is rounding. [1]"""
 BAND, FEWEST_BANDS = 10.0, 20.0
 """Width of the bands within which noise may swell and fade in any way [Hz]; bands up to half the
 sampling rate, where that is low."""
@@ -470,29 +472,31 @@ def _smoothed(values: Array) -> Array:
 def coloured_noise_covariance(fit: LinearisedFit) -> Covariance:
     """Covariance that intervals are quoted from.
 
-    The larger of two errors, unknown by unknown: a smoothed spectrum knows the noise well but takes
-    it as alike all along a run; scores by bands take in noise that is not, but are few. Both take
-    the machine for the same in all runs (see `effects.RunToRun`).
+    The larger of two errors: a smoothed spectrum knows the noise well but takes it as alike all
+    along a run; scores by bands take in noise that is not, but are few. Both take the machine for
+    the same in all runs (see `effects.RunToRun`).
+
+    Notes
+    -----
+    The larger one is taken along each principal axis of the first's correlations, not of each
+    unknown by itself: numbers whose errors make up for each other, as those of a product that alone
+    is determined, would no longer do so if one were widened more than another.
     """
     smoothed, banded = _covariances(fit)
-    return _widened(smoothed, _variance_ratio(banded, smoothed), banded.degrees_of_freedom)
+    return _widened(smoothed, banded)
 
 
-def _variance_ratio(covariance: Covariance, reference: Covariance) -> Array:
-    """(K,) variances over those of a reference; 0 if either is not known."""
-    ratio = np.zeros(covariance.determined.size)
-    has_both = covariance.standard_errors > 0.0
-    has_both &= reference.standard_errors > 0.0
-    has_both &= covariance.determined
-    np.divide(np.diag(covariance.matrix), np.diag(reference.matrix), out=ratio, where=has_both)
-    return ratio
-
-
-def _widened(covariance: Covariance, ratio: Array, freedom: Array) -> Covariance:
-    """A covariance with variances larger by ratios (K,), if above 1, of some degrees of freedom."""
-    stretch = np.sqrt(np.maximum(ratio, 1.0))
-    return replace(
-        covariance,
-        matrix=covariance.matrix * np.outer(stretch, stretch),
-        degrees_of_freedom=np.where(ratio > 1.0, freedom, covariance.degrees_of_freedom),
-    )
+def _widened(covariance: Covariance, other: Covariance) -> Covariance:
+    """A covariance with the variances of another along the axes on which that has larger ones."""
+    known = covariance.determined & other.determined
+    known &= (covariance.standard_errors > 0.0) & (other.standard_errors > 0.0)
+    part = np.ix_(known, known)
+    sizes = covariance.standard_errors[known]
+    units = np.outer(sizes, sizes)
+    variances, axes = np.linalg.eigh(covariance.matrix[part] / units)
+    others = np.sum((other.matrix[part] / units) @ axes * axes, axis=0)
+    matrix = covariance.matrix.copy()
+    matrix[part] = units * ((axes * np.maximum(variances, others)) @ axes.T)
+    is_wider = np.diag(matrix) > (1.0 + ROUNDING) * np.diag(covariance.matrix)
+    freedom = np.where(is_wider, other.degrees_of_freedom, covariance.degrees_of_freedom)
+    return replace(covariance, matrix=matrix, degrees_of_freedom=freedom)
