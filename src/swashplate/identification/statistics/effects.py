@@ -39,6 +39,8 @@ IN_RUN = " in "
 """What stands between an effect and the only run that it belongs to."""
 HYSTERESIS = ("solenoid_hysteresis", "spool_friction")
 """Parameters by which a drive has a hysteresis of its own."""
+ROUNDING = 1e-9
+"""Noise of a command, over its largest value, that is rounding. [1]"""
 FEWEST_RUNS = 5
 """Runs from which it is estimated by how much they differ."""
 
@@ -141,7 +143,7 @@ def changes_of(experiment: Experiment, resolution: float) -> Iterator[Change]:
             f"zero of the command{IN_RUN}{run}", replace(experiment, input=shifted_command), SMALL
         )
     noise = _noise(command.values)
-    if noise > 0.0:
+    if noise > ROUNDING * largest:
         noisier = command.values + SMALL * noise * np.sign(command.values)
         noisy_command = replace(command, values=np.clip(noisier, -largest, largest))
         yield Change("noise of the command", replace(experiment, input=noisy_command), SMALL)
