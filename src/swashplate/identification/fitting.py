@@ -54,13 +54,14 @@ from swashplate.identification.estimation.stages import (
     with_estimates,
 )
 from swashplate.identification.estimation.unknowns import Prior
-from swashplate.identification.jump import first_jumps, unseen_jumps, with_jumps
 from swashplate.identification.lateness import (
+    FIRST,
     is_in_question,
     is_whole_drive,
     lateness_of,
     with_lateness,
 )
+from swashplate.identification.ramp import read_off, with_ramp
 from swashplate.identification.stage_fit import Interval, StageFit
 from swashplate.identification.statistics.intervals import Estimate, uncertainty_of, weighed
 from swashplate.machine import Model as Equations
@@ -365,11 +366,11 @@ def fit(
         settled = settle(runs, smooth(nominal), setup, loss=loss, threads=threads)
         runs, near = settled.runs, dict(settled.near)
         doubts += settled.sentences
-        asked = _Asked(setup, near)
+        asked = _Asked(nominal, setup, near)
         if is_whole_drive(setup, nominal):
-            stages_of = partial(staged, nominal=nominal, runs=runs, threads=threads)
+            stages_of = partial(staged, runs=runs, threads=threads)
             asked = _asked_for(setup, nominal, near, loss, stages_of)
-        setup, near = asked.setup, dict(asked.near)
+        nominal, setup, near = asked.nominal, asked.setup, dict(asked.near)
         stages = asked.interrupted or staged(setup, nominal, runs, solved, threads=threads)
     doubts += tuple(each for stage in stages for each in _unlike(stage, nominal.name))
     return Fit(setup, nominal, tuple(runs), stages, doubts)
@@ -394,6 +395,7 @@ def _unlike(stage: StageFit, drive: str) -> Iterator[str]:
 class _Asked(NamedTuple):
     """A setup of a whole drive with what the runs ask for beyond it."""
 
+    nominal: Parameters
     setup: FitSetup
     near: Mapping[str, float]
     """Values near the optimum by the unknowns' labels; none if unknown."""
@@ -408,7 +410,7 @@ def _asked_for(
     loss: Loss,
     stages_of: Callable[..., tuple[StageFit, ...]],
 ) -> _Asked:
-    """What runs ask for: jumps, a lateness behind the current, and currents that count less.
+    """What runs ask for: a ramp that no guess sees, a lateness, and currents that count less.
 
     By rough fits, which end where a step changes the cost by less than `ROUGH` of itself.
     """
@@ -421,25 +423,27 @@ def _asked_for(
             return SolvedStage(problem, solution)
         return SolvedStage(weighed(problem, solution.vector), solution)
 
-    currents = unseen_jumps(nominal)
-    if currents:
-        setup = with_jumps(setup, currents)
-    first = first_jumps(currents)
+    nominal, setup = with_ramp(nominal, setup)
+    first: Mapping[str, float] = {}
+    if is_in_question(setup, nominal) and read_off(nominal):
+        # a guess has one lag for all, which the step of a search at it does not take apart
+        setup, first = with_lateness(setup), FIRST
+    stages_of = partial(stages_of, nominal=nominal)
     with working("Searching roughly"):
         (stage,) = stages_of(setup, solved=rough)
         if stage.solution.interrupted:
-            return _Asked(setup, near, (stage,))
+            return _Asked(nominal, setup, near, (stage,))
         near, first = stage.values, {}
         if is_in_question(setup, stage.parameters) and (late := lateness_of(stage)):
             setup, near = with_lateness(setup), near | late
             (stage,) = stages_of(setup, solved=rough)
             if stage.solution.interrupted:
-                return _Asked(setup, near, (stage,))
+                return _Asked(nominal, setup, near, (stage,))
             near = stage.values
         freed = less_of_currents(stage)
         if freed is not None:
             setup, near = with_weight_of_currents(setup, freed.factor), freed.values
-    return _Asked(setup, near)
+    return _Asked(nominal, setup, near)
 
 
 class _Stated(NamedTuple):
