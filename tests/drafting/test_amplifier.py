@@ -102,6 +102,45 @@ def test_a_packaged_card_is_recognised(hoist: Drive) -> None:
     assert found.delay == pytest.approx(numbers["tau"], abs=0.005)
 
 
+LIMITED = {"dead": 0.5, "jump": 0.4, "gain": 0.1, "up": 1.5, "down": 3.0, "lag": 0.015}
+
+
+def limited(command: np.ndarray) -> np.ndarray:
+    """Magnitude of a current that jumps at once, then follows at a limited rate, behind a lag."""
+    step = 5e-4
+    fine = np.arange(TIME[0], TIME[-1], step)
+    beyond = np.abs(np.interp(fine, TIME, command)) - LIMITED["dead"]
+    wanted = np.where(beyond > 0.0, LIMITED["jump"] + LIMITED["gain"] * beyond, 0.0)
+    held, lagged, course = 0.0, 0.0, np.zeros(fine.size)
+    for k, goal in enumerate(wanted):
+        lower = held - LIMITED["down"] * step
+        if goal == 0.0:
+            held = lower if lower > LIMITED["jump"] else 0.0
+        else:
+            held = min(max(goal, lower), max(held, LIMITED["jump"]) + LIMITED["up"] * step)
+        lagged += (held - lagged) * step / LIMITED["lag"]
+        course[k] = lagged
+    return np.interp(TIME, fine, course)
+
+
+@pytest.mark.slow
+def test_a_limited_rate_each_way_is_read_off_a_current() -> None:
+    random, made = np.random.default_rng(4), []
+    for name, command in COMMANDS.items():
+        current = limited(command) + random.normal(0.0, 0.003, TIME.size)
+        made.append(run_of(name, command, {"rectified_current": current}, time=TIME))
+    found = guess_amplifier(made)
+    assert found is not None
+    assert found.card == ""
+    for way in (0, 1):
+        assert found.dead_zone[way] == pytest.approx(LIMITED["dead"], abs=0.02)
+        assert found.jump[way] == pytest.approx(LIMITED["jump"], rel=0.03)
+        assert found.gain[way] == pytest.approx(LIMITED["gain"], rel=0.03)
+        assert found.dynamics["lim1"][way] == pytest.approx(LIMITED["up"], rel=0.1)
+        assert found.dynamics["lim2"][way] == pytest.approx(LIMITED["down"], rel=0.2)
+    assert found.fit_percent > 95.0
+
+
 def test_a_way_that_was_not_tried_is_the_other_s() -> None:
     commands = {"up": COMMANDS["up"], "ramp": COMMANDS["ramp up"]}
     found = guess_amplifier(runs("rectified_current", commands))

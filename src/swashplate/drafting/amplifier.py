@@ -449,10 +449,11 @@ def _fitted_form(
         if not all(tried):
             plus, minus = (plus, plus) if tried[0] else (minus, minus)
         numbers[symbol] = plus, minus
+    delay = round(values["tau"], 5)
     dynamics = _Dynamics(trial.dynamics.card, {symbol: numbers[symbol] for symbol in DYNAMIC})
     static_found = {symbol: numbers[symbol] for symbol in static}
-    end = _try_dynamics(measured, static_found, dynamics, np.array([values["tau"]]))
-    return _FittedForm(trial.dynamics.card, numbers, values["tau"], end.error)
+    end = _try_dynamics(measured, static_found, dynamics, np.array([delay]))
+    return _FittedForm(trial.dynamics.card, numbers, delay, end.error)
 
 
 def _simulated_current(drive: Drive, reading: _Currents) -> tuple[Array, Array]:

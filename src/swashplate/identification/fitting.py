@@ -52,8 +52,8 @@ from swashplate.identification.estimation.solving import (
     solve,
     solve_from,
 )
-from swashplate.identification.jump import first_jumps, unseen_jumps, with_jumps
 from swashplate.identification.lateness import (
+    FIRST,
     is_in_question,
     is_whole_drive,
     lateness_of,
@@ -61,6 +61,7 @@ from swashplate.identification.lateness import (
 )
 from swashplate.identification.optimum import Optimum
 from swashplate.identification.statistics.intervals import Estimate, weighed
+from swashplate.identification.unseen import is_guessed, with_unseen
 from swashplate.machine import Model as Equations
 from swashplate.parameters import SIDES, ParameterSet
 from swashplate.progress import LOGGER, working
@@ -349,6 +350,8 @@ def fit(
             problem = weighed(problem, solution.vector)
         return found(setup, _Solved(problem, solution))
 
+    if is_whole_drive(setup, nominal):
+        nominal, setup = with_unseen(nominal, setup)
     with working(f"Fitting {nominal.name}"):
         settled = settle(runs, smooth(nominal), setup, loss=loss, threads=threads)
         runs = settled.runs
@@ -377,11 +380,12 @@ def _asked_for(
     near: Mapping[str, float],
     rough: Callable[[FitSetup, Mapping[str, float], Mapping[str, float]], Fit],
 ) -> _Asked:
-    """What runs ask for: jumps, a lateness behind the current, and currents that count less."""
-    currents = unseen_jumps(nominal)
-    if currents:
-        setup = with_jumps(setup, currents)
-    fit = rough(setup, near, first_jumps(currents))
+    """What runs ask for: a lateness behind the current, and currents that count less."""
+    first: Mapping[str, float] = {}
+    if is_in_question(setup, nominal) and is_guessed(nominal):
+        # a guess has one lag for all, which one step of a search from it does not take apart
+        setup, first = with_lateness(setup), FIRST
+    fit = rough(setup, near, first)
     if fit.interrupted:
         return _Asked(setup, near, fit)
     late = lateness_of(fit) if is_in_question(setup, fit.parameters) else {}

@@ -23,8 +23,10 @@ LATE = ("solenoid_delay", "solenoid_lag")
 USUAL = {"solenoid_delay": 0.05, "solenoid_lag": 0.1}
 """Standard deviation of each beforehand, about 0: proportional valves take 10 to 60 ms, and of what
 follows them, which may be as slow as the pump, the lag is all that stands for it. [s]"""
-FIRST = 0.03
-"""At most where a search begins. [s]"""
+FIRST = {"solenoid_delay": 0.003, "solenoid_lag": 0.03}
+"""Where the search begins of a drive that was read off its logs. [s]"""
+LARGEST_FIRST = 0.03
+"""At most where any other begins. [s]"""
 LARGEST = 0.5
 """[s]"""
 MATTERS = 0.003
@@ -82,5 +84,5 @@ def lateness_of(fit: Optimum) -> dict[str, float]:
     if sizes.sum() < MATTERS or left > (1.0 - EXPLAINS) * squares:
         return {}
     # a search that begins at a bound stays there
-    begin = np.clip(sizes, MATTERS, FIRST).tolist()
+    begin = np.clip(sizes, MATTERS, LARGEST_FIRST).tolist()
     return dict(zip(LATE, begin, strict=True))

@@ -1,0 +1,55 @@
+"""What a machine may do that a guess from its motion does not see: a ramp of the current, a bend.
+
+A ramp of the current looks like a delay and a limited acceleration at first sight, and a guess
+takes gains for straight. Numbers that do not take these into account would be off by more than
+their intervals, so they become estimates.
+"""
+
+from __future__ import annotations
+
+from math import isfinite
+
+from swashplate.identification.estimation.fit_problem import Parameters, is_read_off
+from swashplate.identification.estimation.setup import FitSetup, Free
+from swashplate.identification.estimation.unknowns import Prior
+from swashplate.parameters import SIDES, ParameterSet
+
+RAMP, WITHIN = 0.3, 1.0
+"""Time of a ramp from rest to the current of the largest command beforehand, and the standard
+deviation of its logarithm: cranes have ramps of 0.1 to 1 s. [s], [1]"""
+BEND, LEAST, MOST = 0.15, -0.4, 1.2
+"""Quadratic part of the current at the largest command over the linear one: its standard deviation
+beforehand, and its bounds, up to which more command never means less current. [1]"""
+
+
+def is_guessed(nominal: Parameters) -> bool:
+    """Whether a drive is one that a guess read off logs."""
+    return isinstance(nominal, ParameterSet) and is_read_off(nominal, "V_dz")
+
+
+def with_unseen(nominal: Parameters, setup: FitSetup) -> tuple[Parameters, FitSetup]:
+    """A guessed drive with a limited rate and gains that may bend; others as they are."""
+    if not isinstance(nominal, ParameterSet) or not is_guessed(nominal) or not nominal.tested:
+        return nominal, setup
+    numbers = nominal.numbers
+    beyond = {
+        side: max(volts - numbers[f"V_dz_{side}"], 0.0)
+        for side, volts in zip(SIDES, nominal.tested, strict=True)
+    }
+    free = dict(setup.free)
+    for side, volts in beyond.items():
+        if volts > 0.0 and numbers[f"G2_{side}"] == 0.0:
+            unit = numbers[f"G1_{side}"] / volts
+            free[f"G2_{side}"] = Free(
+                bounds=(LEAST * unit, MOST * unit), prior=Prior(0.0, BEND * unit)
+            )
+    largest = max(numbers[f"G1_{side}"] * volts for side, volts in beyond.items())
+    measured = is_read_off(nominal, "lim1") or isfinite(numbers["lim1_plus"])
+    if largest > 0.0 and not measured:
+        rate = largest / RAMP
+        limited = {"lim1": rate, "lim2": rate, "I_t1": 0.0, "I_t2": 0.0}
+        nominal = nominal.with_numbers(
+            {f"{name}_{side}": value for name, value in limited.items() for side in SIDES}
+        )
+        free |= dict.fromkeys(("lim1", "lim2"), Free(spread=WITHIN, tied=True))
+    return nominal, setup.model_copy(update={"free": free})
