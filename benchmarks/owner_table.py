@@ -3,7 +3,7 @@
     .venv/bin/python benchmarks/owner_table.py [--winches 40] [--jobs 1] [--folder FOLDER]
 
 Each winch is drawn at random (`draw`), tested in eight runs (`tests_of`) and logged by a tacho or
-an encoder. Then an owner's way: guess, fit from the guess with the guessed fit setup, table.
+an encoder. Then an owner's way: guess, fit from the guess, table.
 Truth and model are this package's simulator: what the simulator leaves out is not tested here. Logs
 and fits stay in the folder, so that an interrupted series goes on and a changed table needs no new
 fit; after a change of the guess or of the fit give another folder.
@@ -190,7 +190,7 @@ def write_logs(seed, folder):
 def fitted(seed, folder):
     """The fit of a winch, from its folder or made now."""
     from swashplate import Campaign
-    from swashplate.drafting import guess_drive, guessed_fit_setup, guessed_set
+    from swashplate.drafting import guess_drive, guessed_set
     from swashplate.identification import Identification, identify
 
     folder.mkdir(parents=True, exist_ok=True)
@@ -202,8 +202,7 @@ def fitted(seed, folder):
         begun = time.process_time()
         guess = guess_drive(campaign)
         start = guessed_set(guess, "campaign.toml")
-        (folder / "setup.toml").write_text(guessed_fit_setup(guess, start), "utf-8")
-        identify(campaign, start, folder / "setup.toml").save(place)
+        identify(campaign, start).save(place)
         seconds = time.process_time() - begun
         (folder / "seconds.txt").write_text(f"{seconds:.1f}\n", "utf-8")
     return Identification.load(place, campaign, threads=1)

@@ -420,7 +420,7 @@ def rig(
     examples="""
         swashplate campaign init logs/*.csv --drive neutral
         swashplate guess logs/campaign.toml
-        swashplate fit logs/campaign.toml --from logs/start.toml --setup logs/setup.toml
+        swashplate fit logs/campaign.toml --from logs/start.toml
     """,
 )
 def guess(
@@ -430,8 +430,8 @@ def guess(
     out: Annotated[
         Path | None,
         new_folder(
-            "Folder for start.toml and setup.toml (default: the campaign's).",
-            *("start.toml", "setup.toml"),
+            "Folder for start.toml (default: the campaign's).",
+            "start.toml",
             beside="path",
         ),
     ] = None,
@@ -452,9 +452,8 @@ def guess(
 
     folder = path.parent if out is None else out
     start = folder / "start.toml"
-    setup = folder / "setup.toml"
     with spinner(f"Reading {path}"):
-        check_free(start, setup, force=force)
+        check_free(start, force=force)
         campaign, axis_name = parsing.campaign_of(path, axis)
         check_folder(folder)
         runs = runs_to_fit(campaign, axis_name)
@@ -466,7 +465,6 @@ def guess(
         )
         made_folder(folder)
         Drive(parameters).to_toml(start)
-        write_text(drafting.guessed_fit_setup(guessed, parameters), setup)
         numbers = key_numbers(Drive(parameters))
     note(f"{guessed.axis}: first guess of the numbers that matter")
     show_numbers(numbers)
@@ -481,9 +479,8 @@ def guess(
         f"With these numbers alone: fit {guessed.fit_percent:.1f} % of the mean speeds (100 % is "
         "best)."
     )
-    note(f"Start:             {start}")
-    note(f"Fit setup: {setup}")
-    then = ["swashplate", "fit", str(path), "--from", str(start), "--setup", str(setup)]
+    note(f"Start: {start}")
+    then = ["swashplate", "fit", str(path), "--from", str(start)]
     note(f"Then run\n  {shlex.join(then)}")
 
 

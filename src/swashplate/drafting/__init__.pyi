@@ -8,5 +8,4 @@ from .draft import UNUSED as UNUSED
 from .draft import draft_campaign as draft_campaign
 from .guess import Guess as Guess
 from .guess import guess_drive as guess_drive
-from .starting_point import guessed_fit_setup as guessed_fit_setup
 from .starting_point import guessed_set as guessed_set

@@ -1,8 +1,7 @@
-"""Start of a fit: a guess as a parameter set, and a fit setup that frees it."""
+"""Start of a fit: a guess as a parameter set."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from math import asin, isfinite, sqrt, tan
 
@@ -12,9 +11,8 @@ from numpy.typing import NDArray
 from swashplate.drafting.amplifier import AmplifierGuess
 from swashplate.drafting.guess import Guess, steady_speed
 from swashplate.drive import Drive
-from swashplate.entries import SCHEMA
 from swashplate.errors import ParameterError
-from swashplate.parameters import SIDES, ParameterSet, set_of
+from swashplate.parameters import SIDES, ParameterSet
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -35,17 +33,6 @@ bends the gain, and a search can end with both. [1]"""
 STEEPEST = 30.0
 """Volts that a radian takes at least, so that at 10 V and at the upper bounds of all gains the
 solenoids do not overpower the feedback spring. [V/rad]"""
-SETUP_TEMPLATE = """\
-# Written by `swashplate guess` from the logs of the axis '{0}'. Parameters that they
-# show are free, within bounds about the first guess. A limit that the guess did not see
-# is also free, within wide bounds: a fit distinguishes it from a lag.
-schema = {1}
-title = "{0}, guessed"
-"""
-MOTION = 'channels = ["shaft_speed", "position", "encoder_counts"]\n'
-FREE = "\n[free]\n"
-NO_CREEP = "# {}: Z18 is 0, fixed"
-NOT_TRIED = "# no run goes {}: its numbers are those of the other direction, fixed"
 
 
 def guessed_set(guess: Guess, source: str) -> ParameterSet:
@@ -161,125 +148,8 @@ def _with_current(
     }
 
 
-def guessed_fit_setup(guess: Guess, start: ParameterSet | Drive) -> str:
-    """Text of a fit setup that frees what was guessed, with bounds about it.
-
-    From the command to the motion; if a current was measured, amplifier and pump apart.
-    """
-    numbers, text = set_of(start).numbers, SETUP_TEMPLATE.format(guess.axis, SCHEMA)
-    longest = max(2.0 * guess.delay, guess.delay + 0.1)
-    delay = f"tau = {{ bounds = [0.0, {longest:.4g}] }}    # delay"
-    if guess.amplifier is None:
-        lines = _command_lines(numbers, guess.command, [volts > 0.0 for volts in guess.jump])
-        creep = (
-            _offset_line(guess, numbers) if guess.creep else NO_CREEP.format(_without_creep(guess))
-        )
-        lines += [*_limit_lines(guess), _lag_line(guess, 5.0), delay, creep]
-        return text + MOTION + FREE + "\n".join(lines) + "\n"
-    of_current = _command_lines(numbers, guess.amplifier.command, (True, True))
-    of_current += [*_dynamics_lines(numbers), delay]
-    # the guess's lag is that of amplifier and pump
-    of_motion = [*_solenoid_lines(guess, numbers), *_limit_lines(guess), _lag_line(guess, 20.0)]
-    return text + FREE + "\n".join([*of_current, *of_motion]) + "\n"
-
-
-def _command_lines(
-    numbers: Mapping[str, float], command: Sequence[float], jumps: Sequence[bool]
-) -> list[str]:
-    """Dead zone, jump and gain of the amplifier each way."""
-    lines = list[str]()
-    for side, largest, jumped in zip(SIDES, command, jumps, strict=True):
-        if not largest:
-            lines.append(NOT_TRIED.format(side))
-            continue
-        gain, jump = numbers[f"G1_{side}"], numbers[f"J_{side}"]
-        # so that more command never means less current, whatever the gain within its bounds; a gain
-        # that grows needs no such care, and a stop must not stand for it
-        down, up = 0.2 * gain / largest, 0.6 * gain / largest
-        most = 4.0 * jump if jump else 0.5 * gain * largest
-        lines.append(f"V_dz_{side} = {{ bounds = [0.0, {0.95 * largest:.4g}] }}")
-        if jumped:
-            lines.append(f"J_{side} = {{ bounds = [0.0, {most:.4g}] }}    # jump")
-        lines += [
-            f"G1_{side} = {{ relative = [0.5, 2.0], log = true }}",
-            f"G2_{side} = {{ bounds = [{-down:.4g}, {up:.4g}] }}    # how the gain bends",
-        ]
-    return lines
-
-
-def _dynamics_lines(numbers: Mapping[str, float]) -> list[str]:
-    """Filter and limits of rate of the current; a limit that is off stays off."""
-    lines = [
-        "zeta = { relative = [0.3, 3.0], log = true }    # damping of the current",
-        "omega = { relative = [0.2, 5.0], log = true }    # its natural frequency",
-    ]
-    limits = {"lim1": "rate away from zero", "lim2": "rate towards zero", "a": "final decay"}
-    for symbol, meaning in limits.items():
-        if isfinite(numbers[f"{symbol}_plus"]):
-            lines.append(f"{symbol} = {{ relative = [0.3, 3.0], log = true }}    # {meaning}")
-    if isfinite(numbers["lim1_plus"]) and isfinite(numbers["I_t1_plus"]):
-        lines.append("I_t1 = { relative = [0.5, 2.0] }    # current above which lim1 acts")
-    return lines
-
-
-def _solenoid_lines(guess: Guess, numbers: Mapping[str, float]) -> list[str]:
-    """Dead zone and force of the solenoids."""
-    assert guess.amplifier is not None
-    currents = [guess.amplifier.settled(column, guess.command[column]) for column in range(2)]
-    begins = numbers["Z17"]
-    smallest = min(current for current, volts in zip(currents, guess.command, strict=True) if volts)
-    # below the largest current of either way, or nothing would move
-    most = min(2.0 * begins if begins else 0.5 * smallest, 0.95 * smallest)
-    lines = [f"Z17 = {{ bounds = [0.0, {max(most, 1.05 * begins):.4g}] }}    # dead zone"]
-    lines.append(_offset_line(guess, numbers))
-    for column, side in enumerate(SIDES):
-        if not guess.command[column]:
-            lines.append(NOT_TRIED.format(side))
-            continue
-        bends = 0.5 * numbers[f"Z19_{side}"] / max(currents[column] - begins, 1e-3)
-        lines += [
-            f"Z19_{side} = {{ relative = [0.5, 2.0], log = true }}    # force for a current",
-            f"Z20_{side} = {{ bounds = [{-bends:.4g}, {bends:.4g}] }}    # how it bends",
-        ]
-    return lines
-
-
-def _offset_line(guess: Guess, numbers: Mapping[str, float]) -> str:
-    """Neutral offset of the spool, either way, with room for that of the creep that was seen."""
-    offset = OFFSET * numbers["Z5"] * numbers["Z3"] * guess.speed / numbers["Z10"]
-    offset = max(offset, 2.0 * abs(numbers["Z18"]))
-    return f"Z18 = {{ bounds = [{-offset:.4g}, {offset:.4g}] }}    # neutral offset: creep at rest"
-
-
 def _without_creep(guess: Guess) -> str:
     """Reason why no creep is taken in."""
     if guess.creep is None:
         return "the logs rest too seldom to show a creep"
     return "the logs show no creep at rest"
-
-
-def _limit_lines(guess: Guess) -> list[str]:
-    """Top speed and acceleration of each way that was tried, within wide bounds if not seen."""
-    lines = list[str]()
-    for column, side in enumerate(SIDES):
-        if not guess.command[column]:
-            continue
-        reach = (0.7, 1.4) if isfinite(guess.top_speed[column]) else (0.7, 3.0)
-        lines.append(_limit_line(f"Z13_{side}", reach, "top speed"))
-        reach = (0.3, 3.0) if isfinite(guess.acceleration[column]) else (0.1, 10.0)
-        lines.append(_limit_line(f"Z16_{side}", reach, "acceleration"))
-    return lines
-
-
-def _lag_line(guess: Guess, widest: float) -> str:
-    """Line that frees the lag, up to so many times faster than the guess."""
-    if guess.lag > DISTINGUISHED:
-        return f"Z8 = {{ relative = [0.2, {widest}], log = true }}    # lag"
-    # the acceleration is that of Z8 times Z16: without a lag nothing tells them apart
-    return "# the lag is too short to be seen: Z8 stays fixed"
-
-
-def _limit_line(column: str, reach: tuple[float, float], comment: str) -> str:
-    """Line that frees a limit, between two multiples of its guess."""
-    low, high = reach
-    return f"{column} = {{ relative = [{low}, {high}], log = true }}    # {comment}"
