@@ -1,0 +1,52 @@
+"""A ramp of the current, of a drive that a guess read off a motion alone."""
+
+from dataclasses import replace
+from math import isinf
+
+import pytest
+
+from swashplate import Drive
+from swashplate.identification import whole_drive
+from swashplate.identification.ramp import RAMP, read_off, with_ramp
+from swashplate.parameters import ParameterSet
+
+READ_OFF = ("V_dz", "J", "G1", "tau", "Z8", "Z10", "Z13", "Z16")
+
+
+def guessed(*symbols: str) -> ParameterSet:
+    """The drive "neutral" with numbers as if a guess had read them off tests of up to ±5 V."""
+    drive = Drive.preset("neutral").replace(V_dz=(0.5, 1.0), G1=(0.1, 0.2), tau=0.05)
+    parameters = {
+        symbol: replace(parameter, status="approximate") if symbol in symbols else parameter
+        for symbol, parameter in drive.parameters.items()
+    }
+    return replace(drive.parameters, name="winch", parameters=parameters, tested=(5.0, 5.0))
+
+
+def test_a_guess_from_a_motion_has_a_ramp() -> None:
+    start = guessed(*READ_OFF)
+    assert isinf(start.numbers["lim1_plus"])
+    nominal, setup = with_ramp(start, whole_drive(start))
+    # 0.2 A/V beyond 1 V at 5 V is the larger current
+    assert nominal.numbers["lim1_plus"] == pytest.approx(0.8 / RAMP)
+    assert nominal.numbers["lim2_minus"] == pytest.approx(0.8 / RAMP)
+    assert nominal.numbers["I_t1_plus"] == 0.0
+    free = setup.stages[0].free
+    assert free["lim1"].tied
+    assert free["lim2"].tied
+
+
+def test_what_was_read_off_is_known_less() -> None:
+    free = whole_drive(guessed(*READ_OFF)).stages[0].free
+    assert free["V_dz"].spread == free["Z16"].spread == 0.7
+    assert free["Z1"].spread == 0.3
+
+
+def test_other_drives_are_left_as_they_are() -> None:
+    hoist = Drive.preset("hoist").parameters
+    of_current = guessed(*READ_OFF, "lim1")
+    for nominal in (hoist, of_current):
+        setup = whole_drive(nominal)
+        assert with_ramp(nominal, setup) == (nominal, setup)
+    assert not read_off(hoist)
+    assert read_off(of_current)
