@@ -275,7 +275,12 @@ def outlying_runs(stages: Sequence[StageFit], predicted: Sequence[RunQuality]) -
     for stage in stages or (None,):
         channels = [quality.channel for quality in predicted]
         if stage is not None:
-            channels = list(stage.problem.channels)
+            runs = stage.problem.experiments
+            kinds = {name: channel.kind for run in runs for name, channel in run.channels.items()}
+            # what the model cannot describe tells of no single run
+            channels = [
+                name for name in stage.problem.channels if not stage.stage.counts_less(kinds[name])
+            ]
         for channel in dict.fromkeys(channels):
             for finding in _outliers_by_channel(stage, channel, predicted):
                 if finding.run not in named:
