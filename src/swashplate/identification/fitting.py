@@ -367,7 +367,7 @@ def fit(
         runs, near = settled.runs, dict(settled.near)
         doubts += settled.sentences
         asked = _Asked(nominal, setup, near)
-        if is_whole_drive(setup, nominal):
+        if isinstance(nominal, ParameterSet) and is_whole_drive(setup):
             stages_of = partial(staged, runs=runs, threads=threads)
             asked = _asked_for(setup, nominal, near, loss, stages_of)
         nominal, setup, near = asked.nominal, asked.setup, dict(asked.near)
@@ -405,7 +405,7 @@ class _Asked(NamedTuple):
 
 def _asked_for(
     setup: FitSetup,
-    nominal: Parameters,
+    nominal: ParameterSet,
     near: Mapping[str, float],
     loss: Loss,
     stages_of: Callable[..., tuple[StageFit, ...]],
@@ -434,7 +434,7 @@ def _asked_for(
         if stage.solution.interrupted:
             return _Asked(nominal, setup, near, (stage,))
         near, first = stage.values, {}
-        if is_in_question(setup, stage.parameters) and (late := lateness_of(stage)):
+        if is_in_question(setup, nominal) and (late := lateness_of(stage, nominal)):
             setup, near = with_lateness(setup), near | late
             (stage,) = stages_of(setup, solved=rough)
             if stage.solution.interrupted:

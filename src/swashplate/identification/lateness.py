@@ -12,9 +12,8 @@ from dataclasses import replace
 import numpy as np
 
 from swashplate.errors import DomainError
-from swashplate.identification.estimation.drive_model import DriveModel
 from swashplate.identification.estimation.setup import FitSetup, Free, Stage
-from swashplate.identification.estimation.stages import Parameters, stage_problem
+from swashplate.identification.estimation.stages import smooth, stage_problem
 from swashplate.identification.estimation.unknowns import Prior
 from swashplate.identification.stage_fit import StageFit
 from swashplate.parameters import ParameterSet
@@ -35,19 +34,15 @@ EXPLAINS = 0.002
 """Part of the cost that they must explain, others following: next to nothing is chance."""
 
 
-def is_whole_drive(setup: FitSetup, nominal: Parameters) -> bool:
-    """Whether a setup takes the whole of a drive by its priors."""
-    return (
-        isinstance(nominal, ParameterSet)
-        and len(setup.stages) == 1
-        and setup.stages[0].has_spreads
-        and setup.stages[0].part == "chain"
-    )
+def is_whole_drive(setup: FitSetup) -> bool:
+    """Whether the setup of a drive takes the whole of it by its priors."""
+    (stage, *others) = setup.stages
+    return not others and stage.has_spreads and stage.part == "chain"
 
 
-def is_in_question(setup: FitSetup, nominal: Parameters) -> bool:
+def is_in_question(setup: FitSetup, nominal: ParameterSet) -> bool:
     """Whether a setup takes the whole of a drive by its priors, and nobody stated a lateness."""
-    return is_whole_drive(setup, nominal) and not any(
+    return is_whole_drive(setup) and not any(
         name in setup.stages[0].free or nominal.numbers.get(name) for name in LATE
     )
 
@@ -62,16 +57,15 @@ def with_lateness(setup: FitSetup) -> FitSetup:
     return setup.model_copy(update={"stages": (late,)})
 
 
-def lateness_of(stage_fit: StageFit) -> dict[str, float]:
+def lateness_of(stage_fit: StageFit, nominal: ParameterSet) -> dict[str, float]:
     """Delay and lag that the runs ask for, to begin a search at; none if they ask for none. [s]
 
     By one step of Gauss and Newton from where the fit ended, of all numbers with both beside them:
     their sum must matter, and the step must take a part of the cost away.
     """
     late: Stage = with_lateness(FitSetup(stages=(stage_fit.stage,))).stages[0]
-    model, runs = stage_fit.problem.model, stage_fit.problem.experiments
-    assert isinstance(model, DriveModel)
-    problem = stage_problem(late, model.parameters, runs, threads=stage_fit.problem.threads)
+    runs = stage_fit.problem.experiments
+    problem = stage_problem(late, smooth(nominal), runs, threads=stage_fit.problem.threads)
     fitted = stage_fit.problem.unknowns
     worths = [unknown.worth for unknown in fitted if unknown.prior is not None]
     usual = float(np.median(worths)) if worths else 1.0

@@ -9,7 +9,7 @@ from __future__ import annotations
 from math import isfinite
 
 from swashplate.identification.estimation.setup import FitSetup, Free
-from swashplate.identification.estimation.stages import Parameters, is_read_off
+from swashplate.identification.estimation.stages import is_read_off
 from swashplate.parameters import SIDES, ParameterSet
 
 RAMP, WITHIN = 0.3, 1.0
@@ -17,14 +17,14 @@ RAMP, WITHIN = 0.3, 1.0
 deviation of its logarithm: cranes have ramps of 0.1 to 1 s. [s], [1]"""
 
 
-def read_off(nominal: Parameters) -> bool:
+def read_off(nominal: ParameterSet) -> bool:
     """Whether a drive is one that a guess read off logs."""
-    return isinstance(nominal, ParameterSet) and is_read_off(nominal, "V_dz")
+    return is_read_off(nominal, "V_dz")
 
 
-def with_ramp(nominal: Parameters, setup: FitSetup) -> tuple[Parameters, FitSetup]:
+def with_ramp(nominal: ParameterSet, setup: FitSetup) -> tuple[ParameterSet, FitSetup]:
     """A whole drive that a guess read off a motion, with a limited rate; others as they are."""
-    if not isinstance(nominal, ParameterSet) or not read_off(nominal):
+    if not read_off(nominal):
         return nominal, setup
     numbers = nominal.numbers
     if is_read_off(nominal, "lim1") or isfinite(numbers["lim1_plus"]) or nominal.tested is None:
