@@ -1,11 +1,9 @@
 """The owner's numbers: intervals where the tests tell, one end or none where they do not."""
 
-import tomllib
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from math import inf, sqrt
 from pathlib import Path
-from types import MappingProxyType
 
 import numpy as np
 import pytest
@@ -14,8 +12,16 @@ from tests.identification.given import run_of
 from swashplate import Drive, Experiment, maneuvers
 from swashplate.analysis import envelope, key_numbers
 from swashplate.analysis.propagation import spread_of
-from swashplate.drafting import guess_drive, guessed_fit_setup, guessed_set
-from swashplate.identification import Fit, FitSetup, assess_fit, fit, identifiability_of, predict
+from swashplate.drafting import guess_drive, guessed_set
+from swashplate.identification import (
+    Fit,
+    Prior,
+    assess_fit,
+    fit,
+    identifiability_of,
+    predict,
+    whole_drive,
+)
 from swashplate.identification.estimation.setup import Free
 
 NEUTRAL = Drive.preset("neutral")
@@ -47,20 +53,26 @@ def measured(drive: Drive) -> list[Experiment]:
 
 def fitted(
     runs: Sequence[Experiment],
-    without: Sequence[str] = (),
-    bounds: Mapping[str, tuple[float, float]] = MappingProxyType({}),
+    *,
+    orifice_minus: bool = True,
+    dead_zone_minus: tuple[float, float] | None = None,
 ) -> Fit:
-    """The fit of a guess, by its fit setup without some parameters or with other bounds."""
+    """The fit of every number of a guess; no orifice, or bounds of the dead zone in V, one way."""
     guess = guess_drive(runs)
+    if dead_zone_minus is not None:
+        # a search begins within its bounds
+        guess = guess._replace(dead_zone=(guess.dead_zone[0], sum(dead_zone_minus) / 2.0))
     start = guessed_set(guess, "campaign.toml")
-    setup = FitSetup(**tomllib.loads(guessed_fit_setup(guess, start)))
-    free = {name: entry for name, entry in setup.free.items() if name not in without}
-    free |= {name: Free(bounds=pair) for name, pair in bounds.items()}
-    setup = setup.model_copy(update={"free": free})
-    if without:
-        start = start.replace(dict.fromkeys(without, inf))
-    start = start.replace({name: sum(pair) / 2.0 for name, pair in bounds.items()})
-    return fit(start, runs, setup, threads=1)
+    setup = whole_drive(start)
+    free = dict(setup.free)
+    if not orifice_minus:
+        free["Z16_plus"] = free.pop("Z16")
+        start = start.replace({"Z16_minus": inf})
+    if dead_zone_minus is not None:
+        free["V_dz_plus"] = free.pop("V_dz")
+        wide = Prior(sum(dead_zone_minus) / 2.0, 10.0)
+        free["V_dz_minus"] = Free(bounds=dead_zone_minus, prior=wide)
+    return fit(start, runs, setup.model_copy(update={"free": free}), threads=1)
 
 
 def texts(result: Fit) -> dict[str, str]:
@@ -116,7 +128,7 @@ def test_an_orifice_that_the_fit_does_not_look_for_leaves_no_interval(
     runs: list[Experiment],
 ) -> None:
     """A lag stands for it, and the lag is the same both ways."""
-    result = fitted(runs, without=["Z16_minus"])
+    result = fitted(runs, orifice_minus=False)
     numbers = key_numbers(result)
     doubtful = [
         "acceleration_minus",
@@ -137,7 +149,7 @@ def test_an_estimate_at_its_bound_keeps_its_interval_and_is_named(
     runs: list[Experiment], bounds: tuple[float, float]
 ) -> None:
     """A dead zone of 0.6 V that the search was not allowed, and what it decides."""
-    result = fitted(runs, bounds={"V_dz_minus": bounds})
+    result = fitted(runs, dead_zone_minus=bounds)
     assert "V_dz_minus" in identifiability_of(result).at_bounds
     numbers = key_numbers(result)
     for number in numbers.numbers:
@@ -192,8 +204,7 @@ def test_what_a_guess_did_not_see_is_looked_for(runs: list[Experiment], tmp_path
     guess = guess_drive(runs)._replace(top_speed=(inf, 6.4), acceleration=(inf, 20.0))
     start = guessed_set(guess, "campaign.toml")
     assert start.unreached.keys() == {"Z13_plus", "Z16_plus"}
-    setup = FitSetup(**tomllib.loads(guessed_fit_setup(guess, start)))
-    assert {"Z13_plus", "Z16_plus"} <= setup.free.keys()
+    assert {"Z13", "Z16"} <= whole_drive(start).free.keys()
     # where it starts the limits act under the largest command
     run = Drive(start).simulate(maneuvers.step(8.0))
     assert run.active("swash_stop").any()

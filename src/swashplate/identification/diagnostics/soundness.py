@@ -269,7 +269,12 @@ def outlying_runs(fit: Optimum | None, predicted: Sequence[RunQuality]) -> Itera
     Student's distribution, shared among the runs.
     """
     named = set[str]()
-    channels = fit.problem.channels if fit else [quality.channel for quality in predicted]
+    channels = [quality.channel for quality in predicted]
+    if fit is not None:
+        runs = fit.problem.experiments
+        kinds = {name: channel.kind for run in runs for name, channel in run.channels.items()}
+        # what the model cannot describe tells of no single run
+        channels = [n for n in fit.problem.channels if not fit.setup.counts_less(kinds[n])]
     for channel in dict.fromkeys(channels):
         for finding in _outliers_by_channel(fit, channel, predicted):
             if finding.run not in named:

@@ -258,6 +258,12 @@ class FitSetup(Document):
         known = all(entry.spread or entry.prior for entry in entries)
         return self.forces is None and known and any(entry.spread for entry in entries)
 
+    def counts_less(self, kind: ChannelKind) -> bool:
+        """Whether channels of a kind count less throughout, as what the model cannot describe."""
+        windows = self.weights.get(kind, ())
+        whole = [w for w in windows if w.start is None and w.stop is None and w.maneuver is None]
+        return any(window.factor < 1.0 for window in whole)
+
     def beyond(self, unknown: Unknown, side: int, definitions: Definitions) -> str:
         """What to do about an unknown of the machine at its lower (-1) or upper (1) bound.
 
