@@ -107,7 +107,8 @@ cluster: $(STAMP) ## many starts on a local Dask cluster that loses a worker
 	@$(BIN)/python benchmarks/cluster.py
 
 calibration: $(STAMP) ## how often intervals hold the truth of a machine written apart, 60 campaigns an axis (hours)
-	@$(BIN)/python benchmarks/calibration.py
+	@$(BIN)/python benchmarks/calibration.py --stated-spread 0.06
+	@$(BIN)/python benchmarks/calibration.py --stated-spread 0.06 --without-current
 
 faults: $(STAMP) ## what the verdict says of campaigns with a fault or few instruments (hours)
 	@$(BIN)/python benchmarks/faults.py

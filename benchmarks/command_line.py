@@ -2,6 +2,7 @@
 
 import csv
 import json
+import math
 import os
 import re
 import subprocess
@@ -15,6 +16,8 @@ from second_machine import draws, logger
 
 HYSTERESIS = "solenoid_hysteresis"
 """Cause that every second machine has a little of."""
+DEVIATIONS = 1.96
+"""Half width of a 95 % interval, in standard deviations."""
 LONGEST = 600.0
 """After which a command is ended by default, and the campaign counted as failed. [s]"""
 
@@ -101,37 +104,21 @@ def draft(program, truth, folder):
     return seconds
 
 
-def with_forces(numbers, setup):
-    """Parameters by name, and the forces at the currents of a fit setup."""
-    numbers = dict(numbers)
-    for stage in setup.get("stages", ()):
-        for direction, sign in (("plus", 1.0), ("minus", -1.0)):
-            for n, e in enumerate(stage.get("forces", {}).get(direction, ()), 1):
-                coefficients = [numbers[f"Z{k}_{direction}"] for k in (19, 20, 21, 22)]
-                force = sum(c * (sign * e) ** k for k, c in enumerate(coefficients, 1))
-                numbers[f"force_{direction}_{n}"] = sign * force
-    return numbers
-
-
-OLDER = {"value": "estimate", "lower": "lower 95 %", "upper": "upper 95 %"}
-"""What older installations called the columns of estimates.csv."""
-
-
 def number_in(row, column):
     """Number in a row of estimates.csv; None if the field is empty."""
-    text = row[column] if column in row else row[OLDER[column]]
-    return float(text) if text else None
+    return float(row[column]) if row[column] else None
 
 
 def estimates(fitted, truth):
     """Estimates of what the machine has, and the names of those that it has not.
 
-    "as_read" is the truth in the amperes of the campaign's ammeter.
+    "as_read" is the truth in the amperes of the campaign's ammeter, "told" whether the tests tell
+    something: whether the interval is narrower than half of what was known beforehand. None if no
+    prior was given.
     """
-    file = fitted / "setup.toml"
-    setup = tomllib.loads(file.read_text("utf-8")) if file.exists() else {}
-    numbers = with_forces(truth["parameters"], setup)
-    as_read = with_forces(draws.as_read(truth["parameters"], truth["ammeter_gain"]), setup)
+    numbers = truth["parameters"]
+    as_read = draws.as_read(numbers, truth["ammeter_gain"])
+    spreads = prior_spreads(fitted / "setup.toml")
     rows, without = [], set()
     with (fitted / "estimates.csv").open(encoding="utf-8", newline="") as stream:
         for row in csv.DictReader(stream):
@@ -139,17 +126,36 @@ def estimates(fitted, truth):
             if name not in numbers:
                 without.add(name.partition(" (")[0])
                 continue
+            lower, upper = number_in(row, "lower"), number_in(row, "upper")
+            spread = spreads.get(name, spreads.get(name.rpartition("_")[0]))
             rows.append(
                 {
                     "name": name,
                     "truth": numbers[name],
                     "as_read": as_read[name],
                     "value": number_in(row, "value"),
-                    "lower": number_in(row, "lower"),
-                    "upper": number_in(row, "upper"),
+                    "lower": lower,
+                    "upper": upper,
+                    "told": None if spread is None else is_told(lower, upper, spread),
                 }
             )
     return rows, sorted(without)
+
+
+def prior_spreads(path):
+    """Standard deviations of the logarithms that a fit setup gives, by free parameter. [1]"""
+    if not path.exists():
+        return {}
+    setup = tomllib.loads(path.read_text("utf-8"))
+    entries = [each for stage in setup["stages"] for each in stage["free"].items()]
+    return {name: entry["spread"] for name, entry in entries if "spread" in entry}
+
+
+def is_told(lower, upper, spread):
+    """Whether an interval is narrower than half of a log-normal prior's, in the logarithm."""
+    if lower is None or upper is None or lower * upper <= 0.0:
+        return False
+    return abs(math.log(upper / lower)) < DEVIATIONS * spread
 
 
 def predicted(program, folder, truth, *words, condition=draws.STEADY):
@@ -248,8 +254,8 @@ def fit(program, truth, folder, *words):
     -------
     dict
         "cpu_fit" [s], "memory" [MB], "exit"; of the verdict "usable", "headline", "unsound"
-        (sentences), "causes" (names, in order), "hysteresis" [A] (half
-        its width, if it is one of these), "predictions" and "decisive" (as stored) and
+        (sentences), "blamed" (runs that these name), "causes" (names, in order), "hysteresis" [A]
+        (half its width, if it is one of these), "predictions" and "decisive" (as stored) and
         "assumed"; "stated" as of `stated_error`, "estimates" and "without_counterpart" as of
         `estimates`.
     """
@@ -270,6 +276,7 @@ def fit(program, truth, folder, *words):
         "usable": code == 0,
         "headline": headline[0] if headline else "",
         "unsound": [sentence for *_, sentence in verdict.get("unsound", [])],
+        "blamed": sorted({run for _, run, *_ in verdict.get("unsound", []) if run}),
         "causes": [name for name, *_ in causes],
         "hysteresis": next((size for name, size, *_ in causes if name == HYSTERESIS), None),
         "predictions": predictions,

@@ -26,12 +26,11 @@ import sys
 from collections import Counter
 from pathlib import Path
 from statistics import median
-from types import SimpleNamespace
 
-import numpy as np
 from command_line import CampaignError, Program, draft, fit, new_names, predicted
 from records import (
     half_width,
+    has_own_hysteresis,
     holds,
     miss,
     missing,
@@ -42,19 +41,13 @@ from records import (
     with_interval,
 )
 from second_machine import draws, logger
-from second_machine.faults import FAULTS, FEWER, unseen
-
-from swashplate import Drive
-from swashplate.identification.diagnostics import discrepancy
+from second_machine.faults import FAULTS, FEWER, applies, unseen
+from statements import in_new_maneuvers
 
 FOLDER = Path(__file__).parent
 RATE = 512.0
 FEWER_RATES = {512.0: "at_512", 50.0: "at_50"}
 """Rates of the campaigns with fewer instruments, and their seeds in levels.toml. [Hz]"""
-FEWEST = 50
-"""Samples of a new maneuver from which a class of motion counts."""
-STILL = 1e-4
-"""Part of the speed's range by which it changes in a class at least, if it counts."""
 LATE = r"^(time stamps of \w+|lag of the command|tau)$"
 """What all instruments see alike: a late command, or a machine that answers late."""
 RESISTED = r"^loss of speed under a load that resists"
@@ -98,74 +91,17 @@ UNSOUND = (
 # --- one campaign ---------------------------------------------------------------------------------
 
 
-def in_new_maneuvers(folder, equipment, record):
-    """Stated and true error of the speed in new maneuvers under conditions of the machine's day.
-
-    Parameters
-    ----------
-    folder : Path
-        Holds the logs and the fit.
-    equipment : draws.Equipment
-    record : dict
-        As of `command_line.fit`.
-
-    Returns
-    -------
-    list of dict
-        "maneuver", "motion" (a class of `discrepancy.classes_of`), "stated" and "true", RMS in % of
-        the signal's range; "stated" is None for a class that the verdict calls unknown.
-    """
-    stored = [each for each in record["predictions"] if each["channel"] in record["decisive"][:1]]
-    if not stored:
-        return []
-    prediction = discrepancy.PredictionError(**stored[0])
-    drive = Drive.from_toml(folder / "fitted" / "drive.toml")
-    logs = sorted((folder / "logs").iterdir())
-    volts = [np.loadtxt(path, delimiter=",", skiprows=1, usecols=1) for path in logs]
-    largest = float(np.abs(np.concatenate(volts)).max())
-    conditions, names, rows = list(equipment.conditions.values()), new_names(), []
-    for index, name in enumerate(names):
-        place = round((index + 0.5) / len(names) * (len(conditions) - 1))
-        run = logger.new_run(equipment.parameters, equipment.axis, name, conditions[place])
-        errors = stated_and_true(prediction, drive, run, largest)
-        rows += [{"maneuver": name, **each} for each in errors]
-    return rows
-
-
-def stated_and_true(prediction, drive, run, largest):
-    """Errors of `in_new_maneuvers` in one maneuver, (n, 3) as of `logger.new_run`."""
-    _, command, speed = run.T
-    signal, step = drive.simulate(command, logger.NEW_RATE).shaft_speed, 1.0 / logger.NEW_RATE
-    rate = discrepancy.TIME * np.gradient(signal, step)
-    # all that its class depends on
-    record = SimpleNamespace(step=step, signal=signal, rate=rate, command=command)
-    known = {motion for motion, *_ in prediction.classes}
-    for motion, inside in discrepancy.classes_of(record, prediction.reach, largest).items():
-        if inside.sum() < FEWEST or np.ptp(speed[inside]) < STILL * prediction.reach:
-            continue
-        stated = 100.0 * stated_error(prediction, motion, signal[inside], rate[inside])
-        true = 100.0 * np.sqrt(np.mean((signal - speed)[inside] ** 2)) / prediction.reach
-        yield {
-            "motion": motion,
-            "stated": stated if motion in known else None,
-            "true": float(true),
-        }
-
-
-def stated_error(prediction, motion, signal, rate):
-    """Error over the range of the model in a maneuver, and what is left open of its class. [1]"""
-    model = np.mean(prediction.squares(signal, rate)) / prediction.reach**2
-    classes = (discrepancy.ClassError(*stated) for stated in prediction.classes)
-    open_by_class = {stated.motion: stated.left_open for stated in classes}
-    return float(np.sqrt(model + open_by_class.get(motion, 0.0) ** 2))
-
-
 def findings(program, folder):
     """Sentences that `campaign check` marks."""
     code, output, _, _ = program.run("campaign", "check", "campaign.toml", folder=folder)
     if code:
         raise CampaignError(output)
     return [line[2:] for line in output.splitlines() if line.startswith("! ")]
+
+
+def run_name(axis, run):
+    """Name of a run in a drafted campaign."""
+    return Path(logger.file_name(axis, run)).stem
 
 
 def campaign(program, fault, axis, rate, seed, folder):
@@ -176,12 +112,15 @@ def campaign(program, fault, axis, rate, seed, folder):
     truth = logger.write_campaign(equipment, folder)
     record = {"unseen": unseen(change, sound), "cpu_init": draft(program, truth, folder)}
     record["check"] = findings(program, folder)
+    record["guilty"] = [run_name(axis, run) for run in equipment.elsewhere]
     try:
         record |= fit(program, truth, folder)
     except CampaignError as error:
         said = " ".join(str(error).split())
         refused = {"usable": False, "exit": error.code, "headline": said, "unsound": [said]}
-        return record | refused | {"causes": []}
+        runs = [run_name(axis, run) for run in equipment.conditions]
+        blamed = [run for run in runs if re.search(rf"{re.escape(run)}\b", said)]
+        return record | refused | {"blamed": blamed, "causes": []}
     widths = [condition.hysteresis for condition in equipment.conditions.values()]
     record["own_hysteresis"] = 0.5 * max(widths)
     record["statements"] = in_new_maneuvers(folder, equipment, record)
@@ -196,7 +135,7 @@ def fault_items(faults, axes, campaigns, sound, first):
         for n in range(max(campaigns, sound))
         for fault in faults
         for axis in axes
-        if n < (sound if fault == "none" else campaigns)
+        if n < (sound if fault == "none" else campaigns) and applies(fault, axis)
     ]
 
 
@@ -270,8 +209,7 @@ def class_of(row):
 
 def is_right(record):
     """Whether a cause is the fault, or the hysteresis that the machine has, to half of it."""
-    found, own = record.get("hysteresis"), record.get("own_hysteresis", 0.0)
-    return named(record) == "cause" or (found is not None and own / 1.5 < found < 1.5 * own)
+    return named(record) == "cause" or has_own_hysteresis(record)
 
 
 def named(record):
@@ -306,7 +244,7 @@ VERDICTS = (
 )
 HEAD = (
     *("fault", "axis", "class", "check, findings", *VERDICTS),
-    *("error on new, %", "worst value, half widths", "named"),
+    *("error on new, %", "worst value, half widths", "named", "sound runs blamed"),
 )
 
 
@@ -360,7 +298,14 @@ def fault_row(fault, axis, rows):
         number([max(row["new"].values()) for row in done]),
         number([max(map(miss_or_zero, row["estimates"]), default=0.0) for row in done]),
         shares(row["named"] for row in rows),
+        ", ".join(run for row in rows for run in wrongly_blamed(row)) or "-",
     )
+
+
+def wrongly_blamed(row):
+    """Runs that a verdict calls unsound beside the guilty ones; none if a fault is in all runs."""
+    one_by_one = row["fault"] == "none" or row["guilty"]
+    return [run for run in row["blamed"] if one_by_one and run not in row["guilty"]]
 
 
 def miss_or_zero(row):
@@ -439,7 +384,7 @@ def main():
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
-    axes = ("hoist", "slew")
+    axes = ("hoist", "slew", "luff")
     parser.add_argument("--axis", nargs="+", choices=axes, default=axes)
     parser.add_argument("--fault", nargs="+", choices=FAULTS, default=list(FAULTS))
     parser.add_argument("--campaigns", type=int, default=2, help="of each fault")

@@ -91,6 +91,12 @@ def miss(row):
     return abs(row["truth"] - middle) / half
 
 
+def has_own_hysteresis(record):
+    """Whether a cause is the hysteresis that the machine has, to half of it."""
+    found, own = record.get("hysteresis"), record.get("own_hysteresis", 0.0)
+    return found is not None and own / 1.5 < found < 1.5 * own
+
+
 def present(values):
     """The values that are there."""
     return [value for value in values if value is not None]

@@ -25,6 +25,16 @@ def bench() -> ModuleType:
         return faults
 
 
+@pytest.fixture(scope="module")
+def calibration() -> ModuleType:
+    """The bench of intervals as a module."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.syspath_prepend(str(BENCHMARKS))
+        import calibration
+
+        return calibration
+
+
 @pytest.mark.slow
 def test_calibration_goes_from_logs_to_tables_and_goes_on(tmp_path: Path) -> None:
     """One campaign: drafted, fitted, predicted, counted; a second call does not run it again."""
@@ -55,7 +65,11 @@ def test_calibration_goes_from_logs_to_tables_and_goes_on(tmp_path: Path) -> Non
     assert rows["Z8"]["value"] == pytest.approx(rows["Z8"]["truth"], rel=0.2)
     assert len(record["new"]) == 5
     assert max(record["new"].values()) < 5.0
-    assert "| luff | 512 | 1 (1000 to 1000) |" in first
+    assert "| luff | with | 30 % | 0 % | 512 | 1 (1000 to 1000) |" in first
+    # ramps pass the dead zone; no test reaches the spool's stop
+    assert rows["V_dz_plus"]["told"]
+    assert not rows["Z14"]["told"]
+    assert {each["maneuver"] for each in record["statements"]} == set(record["new"])
     assert run() == first
     assert len((tmp_path / "found.jsonl").read_text("utf-8").splitlines()) == 1
 
@@ -66,7 +80,99 @@ def record(fault: str, new: float, value: float, **more: Any) -> dict[str, Any]:
     errors = {"step +1 V": new, "step -1 V": 0.0, "stair": 0.0, "sine 0.5 Hz": 0.0, "chirp": 0.0}
     entries = {"axis": "hoist", "rate": 512.0, "seed": 0, "unseen": False, "exit": 0}
     verdict = {"unsound": [], "causes": [], "check": [], "new": errors, "estimates": [row]}
+    verdict |= {"guilty": [], "blamed": []}
     return entries | verdict | {"fault": fault} | more
+
+
+def campaign_record(seed: int, current: bool, new: float, **more: Any) -> dict[str, Any]:
+    """A record of the bench of intervals: ten estimates of 10, with the ends 9 and 11."""
+    row = {"truth": 10.0, "as_read": 10.0, "value": 10.0, "lower": 9.0, "upper": 11.0}
+    rows = [{**row, "name": f"Z{n}", "told": n % 2 == 0} for n in range(10)]
+    rows[1]["truth"] = rows[2]["truth"] = 12.0
+    names = ("step +1 V", "step -1 V", "stair", "sine 0.5 Hz", "chirp")
+    group = {"axis": "hoist", "current": current, "prior": 0.3, "stated_spread": 0.06}
+    entries = {"rate": 512.0, "seed": seed, "exit": 0, "unsound": [], "blamed": [], "causes": []}
+    found = {"estimates": rows, "new": dict.fromkeys(names, 0.1) | {"chirp": new}}
+    measures = {"cpu_init": 1.0, "cpu_fit": 2.0, "memory": 3.0, "stated": 0.5}
+    return group | entries | found | measures | {"hysteresis": None} | more
+
+
+def test_intervals_that_the_tests_tell_are_counted_apart(calibration: ModuleType) -> None:
+    records = [campaign_record(0, True, 0.2), campaign_record(1, True, 0.4, exit=1)]
+    ((group, some),) = calibration.groups(records).items()
+    cells = dict(zip(calibration.OVERVIEW, calibration.overview_row(group, some), strict=True))
+    assert cells["exit codes"] == "0 (1), 1 (1)"
+    assert (cells["intervals"], cells["that the tests tell"]) == (20, 10)
+    assert cells["hold the truth"].startswith("80.0%")
+    assert cells["of these hold"].startswith("80.0%")
+    assert cells["by campaign"] == "80% to 80%"
+    assert cells["half width, median %"] == "10"
+
+
+def test_how_narrow_an_interval_of_a_prior_is(calibration: ModuleType, tmp_path: Path) -> None:
+    """95 % of a log-normal prior of 30 % lie between exp(-0.588) and exp(0.588) of the nominal."""
+    from command_line import is_told, prior_spreads
+
+    assert is_told(0.76, 1.34, 0.3)  # ln 1.34/0.76 = 0.567
+    assert not is_told(0.74, 1.34, 0.3)  # 0.594
+    assert is_told(-1.34, -0.76, 0.3)
+    assert not is_told(-0.1, 1.0, 0.3)
+    assert not is_told(0.9, None, 0.3)
+    text = "[[stages]]\nfree = { J = { spread = 0.3 }, Z1 = { relative = [0.5, 2.0] } }\n"
+    (tmp_path / "setup.toml").write_text(text)
+    assert prior_spreads(tmp_path / "setup.toml") == {"J": 0.3}
+    assert prior_spreads(tmp_path / "none.toml") == {}
+
+
+def test_statements_are_those_of_maneuvers(calibration: ModuleType) -> None:
+    """Of two classes by their samples; a faster sine has a statement of its own."""
+    rows = [
+        {"maneuver": "stair", "samples": 300, "printed": 1.0, "true": 2.0, "faster": None},
+        {"maneuver": "stair", "samples": 100, "printed": 3.0, "true": 0.0, "faster": None},
+        {"maneuver": "stair", "samples": 900, "printed": None, "true": 9.0, "faster": None},
+        {"maneuver": "sine 0.5 Hz", "samples": 10, "printed": 1.0, "true": 2.0, "faster": 6.0},
+        {"maneuver": "chirp", "samples": 10, "printed": 1.0, "true": 4.0, "faster": None},
+    ]
+    one = campaign_record(0, True, 0.2, statements=rows)
+    found = {each.maneuver: each for each in calibration.statements(one)}
+    # (300 · 1 + 100 · 9) / 400 = 3, and (300 · 4) / 400 = 3
+    assert found["stair"][2:] == pytest.approx((3.0**0.5, 3.0**0.5, False))
+    assert found["sine 0.5 Hz"][2:] == (6.0, 2.0, True)
+    ((group, some),) = calibration.groups([one]).items()
+    assert calibration.statement_row(group, some)[-3:] == ("1 of 2, 0.62", "1 of 1, 3", 1)
+
+
+def test_errors_with_and_without_an_ammeter(calibration: ModuleType) -> None:
+    """Of seeds that have both."""
+    pairs = [(0.2, 0.4), (0.4, 0.4), (1.0, 3.0)]
+    records = [campaign_record(9, True, 9.0)]
+    for seed, (with_one, without) in enumerate(pairs):
+        records += [campaign_record(seed, True, with_one), campaign_record(seed, False, without)]
+    ((axis, *_, campaigns, with_one, without, ratio, usual),) = calibration.instrument_rows(
+        calibration.groups(records)
+    )
+    assert (axis, campaigns, with_one, without) == ("hoist", 3, "0.4", "0.4")
+    assert (ratio, usual) == ("1", "2")
+
+
+def test_false_alarms_of_sound_campaigns(calibration: ModuleType) -> None:
+    own = {"causes": ["solenoid_hysteresis"], "hysteresis": 4e-4, "own_hysteresis": 3.5e-4}
+    records = [
+        campaign_record(0, True, 0.2, **own),
+        campaign_record(1, True, 0.2, causes=["tau"]),
+        campaign_record(2, True, 0.2, unsound=["a run"], blamed=["hoist_step"]),
+    ]
+    ((group, some),) = calibration.groups(records).items()
+    row = calibration.alarm_row(group, some)
+    assert row[-5:] == (3, 2, 1, "tau (1)", "hoist_step (2)")
+
+
+def test_sound_runs_that_are_blamed_beside_the_guilty_one(bench: ModuleType) -> None:
+    late = record("one run late by 0.2 s", 0.0, 10.0, guilty=["sine"], blamed=["ramp", "sine"])
+    assert bench.wrongly_blamed(late) == ["ramp"]
+    assert bench.wrongly_blamed(record("none", 0.0, 10.0, blamed=["ramp"])) == ["ramp"]
+    # in every run
+    assert not bench.wrongly_blamed(record("ammeter clipped", 0.0, 10.0, blamed=["ramp"]))
 
 
 def test_classes_are_beyond_the_sound_campaign(bench: ModuleType) -> None:
@@ -166,6 +272,8 @@ def test_errors_are_stated_by_class_under_the_days_conditions(
     assert {row["stated"] for row in rows if row["motion"] == "small"} == {None}
     stated = [row["stated"] for row in rows if row["motion"] != "small"]
     assert stated == pytest.approx([2.0] * len(stated))
+    assert {row["printed"] for row in rows if row["motion"] != "small"} == {2.0}
+    assert {row["faster"] for row in rows} == {None}
     worst: dict[str, float] = {}
     for row in rows:
         worst[row["maneuver"]] = max(row["true"], worst.get(row["maneuver"], 0.0))
