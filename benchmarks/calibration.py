@@ -61,8 +61,8 @@ from second_machine import draws, logger
 from statements import in_new_maneuvers
 
 from swashplate import Drive
+from swashplate.identification.estimation.fit_problem import LIKE_NAMED, whole_drive
 from swashplate.identification.estimation.setup import setup_text
-from swashplate.identification.estimation.stages import LIKE_NAMED, whole_drive
 
 FOLDER = Path(__file__).parent
 CYLINDER = FOLDER / "cylinder.py"

@@ -147,7 +147,7 @@ def prior_spreads(path):
     if not path.exists():
         return {}
     setup = tomllib.loads(path.read_text("utf-8"))
-    entries = [each for stage in setup["stages"] for each in stage["free"].items()]
+    entries = setup["free"].items()
     return {name: entry["spread"] for name, entry in entries if "spread" in entry}
 
 

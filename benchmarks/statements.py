@@ -49,8 +49,8 @@ def in_new_maneuvers(folder, equipment, record):
         place = round((index + 0.5) / len(names) * (len(conditions) - 1))
         run = logger.new_run(equipment.parameters, equipment.axis, name, conditions[place])
         errors = stated_and_true(prediction, drive, run, largest)
-        apart = prediction.faster if name == FASTER else None
-        faster = None if apart is None else 100.0 * apart.error
+        apart = [part.error for part in prediction.beyond if name == FASTER and "Hz" in part.motion]
+        faster = 100.0 * apart[0] if apart else None
         rows += [{"maneuver": name, **each, "faster": faster} for each in errors]
     return rows
 
@@ -80,6 +80,5 @@ def restored(entry):
     """The `discrepancy.PredictionError` that a verdict stores."""
     entry = dict(entry)
     entry["classes"] = tuple(discrepancy.ClassError(*each) for each in entry["classes"])
-    if entry.get("faster"):
-        entry["faster"] = discrepancy.FasterError(*entry["faster"])
+    entry["beyond"] = tuple(discrepancy.BeyondTests(*each) for each in entry["beyond"])
     return discrepancy.PredictionError(**entry)
