@@ -118,7 +118,7 @@ def test_how_narrow_an_interval_of_a_prior_is(calibration: ModuleType, tmp_path:
     assert is_told(-1.34, -0.76, 0.3)
     assert not is_told(-0.1, 1.0, 0.3)
     assert not is_told(0.9, None, 0.3)
-    text = "[[stages]]\nfree = { J = { spread = 0.3 }, Z1 = { relative = [0.5, 2.0] } }\n"
+    text = "free = { J = { spread = 0.3 }, Z1 = { relative = [0.5, 2.0] } }\n"
     (tmp_path / "setup.toml").write_text(text)
     assert prior_spreads(tmp_path / "setup.toml") == {"J": 0.3}
     assert prior_spreads(tmp_path / "none.toml") == {}

@@ -7,7 +7,7 @@ from tools.mirror import faces_of, imports_of, kinds_by_package, modules_of
 ROOT = Path(__file__).parents[1]
 ASKED = {
     "analysis": (
-        3,
+        1,
         "draws from a fit are those of a drive: identification knows models of its own",
     ),
     "cli": (5, "a file of one's own holds a Machine, a Drive, a Model or a UserModel: the door"),
@@ -15,7 +15,7 @@ ASKED = {
     "drive": (1, "what is equal to a drive is one"),
     "export": (4, "the door, and a drive's value references, which never change"),
     "full_order": (1, "what is equal to such a drive is one"),
-    "identification": (53, "a fit has its own kinds of model, until it has one problem"),
+    "identification": (55, "a fit is of a drive or of a user-defined model"),
     "machine": (3, "the doors: join takes models or machines, linearize refuses what is none"),
     "report": (2, "a page of a fit is that of a drive or of a user-defined model"),
 }

@@ -137,10 +137,10 @@ def test_an_orifice_that_the_fit_does_not_look_for_leaves_no_interval(
     for label in doubtful:
         assert numbers[label].interval == (None, None)
         assert "Z16_minus fixed" in texts(result)[label]
-    # the gain bends to make up for it, with some processors' last digits as far as it may: the dead
-    # zone is then 1.0 V, not 0.6, so that its interval must hold the truth
-    low, high = numbers["dead_zone_minus"].interval
-    assert low <= -0.6 <= high
+    # ramp and bend make up for it as far as they may. The dead zone that results is false, and no
+    # interval covers a limit that the model lacks, but the fit says so
+    assert identifiability_of(result).at_bounds
+    assert any("not like" in doubt for doubt in result.doubts)
 
 
 @pytest.mark.slow
@@ -160,7 +160,10 @@ def test_an_estimate_at_its_bound_keeps_its_interval_and_is_named(
     # its error is at most what a uniform distribution between the bounds has
     low, high = numbers["dead_zone_minus"].interval
     assert high - low <= 2.0 * 1.96 * (bounds[1] - bounds[0]) / sqrt(12.0)
-    assert numbers["dead_zone_plus"].note == numbers["acceleration_plus"].note == ""
+    # the other way has lag and ramp in common with this one, but holds
+    assert numbers["top_speed_plus"].note == numbers["acceleration_plus"].note == ""
+    low, high = numbers["dead_zone_plus"].interval
+    assert low <= 0.8 <= high
 
 
 @pytest.mark.slow
@@ -172,8 +175,7 @@ def test_a_spread_is_that_of_the_covariance(found: Fit) -> None:
 
     spread = spread_of(found, dead_zones)
     errors = np.array([found[f"V_dz_{way}"].standard_error for way in WAYS])
-    # and what assumed parameters add
-    assert (spread.half >= 1.96 * errors).all()
+    # bounds of the search count as a prior there, so that it may be a little narrower
     assert spread.half == pytest.approx(1.96 * errors, rel=0.05)
     assert not spread.below.any()
     assert not spread.above.any()

@@ -178,9 +178,10 @@ def spread_of(fit: Optimum, numbers: Numbers, left_out: Sequence[str] = ()) -> S
     following = within @ slopes_by(fit, assumed)
     for together, change in zip(assumed, following.T, strict=True):
         variance += derivatives.along(change, together) ** 2
+    leaning = {name: derivatives.along(error) ** 2 for name, error in _errors_at_bounds(fit)}
+    most = np.max([np.zeros_like(variance), *leaning.values()], axis=0)
     at_bounds = {
-        name: derivatives.along(error) ** 2 > LEANS * variance
-        for name, error in _errors_at_bounds(fit)
+        name: (squares > LEANS * variance) & (squares == most) for name, squares in leaning.items()
     }
     below, above = derivatives.left_open(left_out)
     return Spread(QUANTILE * np.sqrt(variance), below, above, at_bounds)
@@ -229,13 +230,16 @@ def _errors_at_bounds(fit: Optimum) -> Iterator[tuple[str, Array]]:
     """Name of each estimate of the machine at a bound, and a standard error that others follow.
 
     An estimate at its bound is not where the data would have it: by how much it is off is not
-    known.
+    known. One of what is known to be near its bound beforehand, such as a lag that a machine need
+    not have, is where it belongs.
     """
     unknowns, covariance = fit.problem.unknowns, _covariance(fit)
     for name in identifiability_of(fit).at_bounds:
         index = unknowns.names.index(name)
         deviation = float(np.sqrt(max(covariance[index, index], 0.0)))
-        if unknowns[index].run is None and deviation > NEGLIGIBLE:
+        prior = unknowns[index].prior
+        belongs = prior is not None and prior.mean in (unknowns[index].low, unknowns[index].high)
+        if unknowns[index].run is None and deviation > NEGLIGIBLE and not belongs:
             yield name, covariance[index] / deviation
 
 

@@ -1,12 +1,13 @@
-"""What a machine may do that a guess from its motion does not see: a ramp of the current, a bend.
+"""What a machine may do that a guess from its logs does not see: gains that bend, a ramp.
 
-A ramp of the current looks like a delay and a limited acceleration at first sight, and a guess
-takes gains for straight. Numbers that do not take these into account would be off by more than
-their intervals, so they become estimates.
+A guess takes gains for straight, that of the amplifier and of the solenoids; and a ramp of a
+current that was not measured looks like a delay and a limited acceleration. Numbers that do not
+take these into account would be off by more than their intervals, so they become estimates.
 """
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from math import isfinite
 
 from swashplate.identification.estimation.fit_problem import Parameters, is_read_off
@@ -20,6 +21,9 @@ deviation of its logarithm: cranes have ramps of 0.1 to 1 s. [s], [1]"""
 BEND, LEAST, MOST = 0.15, -0.4, 1.2
 """Quadratic part of the current at the largest command over the linear one: its standard deviation
 beforehand, and its bounds, up to which more command never means less current. [1]"""
+FORCE, FARTHEST = 0.3, 1.2
+"""Part of the solenoids' force at the current of the largest command that each power of the current
+beyond the first may have: its standard deviation about 0 beforehand, and its bounds. [1]"""
 
 
 def is_guessed(nominal: Parameters) -> bool:
@@ -28,7 +32,10 @@ def is_guessed(nominal: Parameters) -> bool:
 
 
 def with_unseen(nominal: Parameters, setup: FitSetup) -> tuple[Parameters, FitSetup]:
-    """A guessed drive with a limited rate and gains that may bend; others as they are."""
+    """A guessed drive with gains that may bend and a limited rate; others as they are.
+
+    With a measured current, of which the solenoids' force was read off as well, that may bend too.
+    """
     if not isinstance(nominal, ParameterSet) or not is_guessed(nominal) or not nominal.tested:
         return nominal, setup
     numbers = nominal.numbers
@@ -43,6 +50,8 @@ def with_unseen(nominal: Parameters, setup: FitSetup) -> tuple[Parameters, FitSe
             free[f"G2_{side}"] = Free(
                 bounds=(LEAST * unit, MOST * unit), prior=Prior(0.0, BEND * unit)
             )
+    if is_read_off(nominal, "Z19"):
+        free |= _bending_forces(nominal, beyond)
     largest = max(numbers[f"G1_{side}"] * volts for side, volts in beyond.items())
     measured = is_read_off(nominal, "lim1") or isfinite(numbers["lim1_plus"])
     if largest > 0.0 and not measured:
@@ -53,3 +62,19 @@ def with_unseen(nominal: Parameters, setup: FitSetup) -> tuple[Parameters, FitSe
         )
         free |= dict.fromkeys(("lim1", "lim2"), Free(spread=WITHIN, tied=True))
     return nominal, setup.model_copy(update={"free": free})
+
+
+def _bending_forces(nominal: ParameterSet, beyond: Mapping[str, float]) -> dict[str, Free]:
+    """How the solenoids' forces Z20 to Z22 are free, by commands beyond the dead zone [V]."""
+    numbers, free = nominal.numbers, dict[str, Free]()
+    for side, volts in beyond.items():
+        current = numbers[f"J_{side}"] + numbers[f"G1_{side}"] * volts - numbers["Z17"]
+        if not current > 0.0:
+            continue
+        for power, symbol in enumerate(("Z20", "Z21", "Z22"), 1):
+            unit = numbers[f"Z19_{side}"] / current**power
+            if numbers[f"{symbol}_{side}"] == 0.0:
+                free[f"{symbol}_{side}"] = Free(
+                    bounds=(-FARTHEST * unit, FARTHEST * unit), prior=Prior(0.0, FORCE * unit)
+                )
+    return free
