@@ -15,7 +15,7 @@ ASKED = {
     "drive": (1, "what is equal to a drive is one"),
     "export": (4, "the door, and a drive's value references, which never change"),
     "full_order": (1, "what is equal to such a drive is one"),
-    "identification": (55, "a fit is of a drive or of a user-defined model"),
+    "identification": (52, "a fit is of a drive or of a user-defined model"),
     "machine": (3, "the doors: join takes models or machines, linearize refuses what is none"),
     "report": (2, "a page of a fit is that of a drive or of a user-defined model"),
 }

@@ -238,7 +238,8 @@ def _errors_at_bounds(fit: Optimum) -> Iterator[tuple[str, Array]]:
         index = unknowns.names.index(name)
         deviation = float(np.sqrt(max(covariance[index, index], 0.0)))
         prior = unknowns[index].prior
-        belongs = prior is not None and prior.mean in (unknowns[index].low, unknowns[index].high)
+        low, high = unknowns[index].low, unknowns[index].high
+        belongs = prior is not None and not low < prior.mean < high
         if unknowns[index].run is None and deviation > NEGLIGIBLE and not belongs:
             yield name, covariance[index] / deviation
 

@@ -1,8 +1,10 @@
-"""What a machine may do that a guess from its logs does not see: gains that bend, a ramp.
+"""What a machine may do that a guess from its logs does not see: a jump, gains that bend, a ramp.
 
 A guess takes gains for straight, that of the amplifier and of the solenoids; and a ramp of a
 current that was not measured looks like a delay and a limited acceleration. Numbers that do not
-take these into account would be off by more than their intervals, so they become estimates.
+take these into account would be off by more than their intervals, so they become estimates. So
+does a jump at the edge of the dead zone: a smaller dead zone and a larger one with a jump look
+alike but near rest.
 """
 
 from __future__ import annotations
@@ -21,6 +23,9 @@ deviation of its logarithm: cranes have ramps of 0.1 to 1 s. [s], [1]"""
 BEND, LEAST, MOST = 0.15, -0.4, 1.2
 """Quadratic part of the current at the largest command over the linear one: its standard deviation
 beforehand, and its bounds, up to which more command never means less current. [1]"""
+JUMP, LARGEST, FIRST = 0.05, 0.3, 0.01
+"""Jump of the current over that of the largest command: its standard deviation about 0 beforehand,
+its bound, and where a search begins, as one at its bound would stay there. [1]"""
 FORCE, FARTHEST = 0.3, 1.2
 """Part of the solenoids' force at the current of the largest command that each power of the current
 beyond the first may have: its standard deviation about 0 beforehand, and its bounds. [1]"""
@@ -32,7 +37,7 @@ def is_guessed(nominal: Parameters) -> bool:
 
 
 def with_unseen(nominal: Parameters, setup: FitSetup) -> tuple[Parameters, FitSetup]:
-    """A guessed drive with gains that may bend and a limited rate; others as they are.
+    """A guessed drive with a jump, gains that may bend and a limited rate; others as they are.
 
     With a measured current, of which the solenoids' force was read off as well, that may bend too.
     """
@@ -43,8 +48,14 @@ def with_unseen(nominal: Parameters, setup: FitSetup) -> tuple[Parameters, FitSe
         side: max(volts - numbers[f"V_dz_{side}"], 0.0)
         for side, volts in zip(SIDES, nominal.tested, strict=True)
     }
-    free = dict(setup.free)
+    free, changed = dict(setup.free), dict[str, float]()
     for side, volts in beyond.items():
+        current = numbers[f"G1_{side}"] * volts
+        if current > 0.0 and numbers[f"J_{side}"] == 0.0:
+            free[f"J_{side}"] = Free(
+                bounds=(0.0, LARGEST * current), prior=Prior(0.0, JUMP * current)
+            )
+            changed[f"J_{side}"] = FIRST * current
         if volts > 0.0 and numbers[f"G2_{side}"] == 0.0:
             unit = numbers[f"G1_{side}"] / volts
             free[f"G2_{side}"] = Free(
@@ -57,11 +68,9 @@ def with_unseen(nominal: Parameters, setup: FitSetup) -> tuple[Parameters, FitSe
     if largest > 0.0 and not measured:
         rate = largest / RAMP
         limited = {"lim1": rate, "lim2": rate, "I_t1": 0.0, "I_t2": 0.0}
-        nominal = nominal.with_numbers(
-            {f"{name}_{side}": value for name, value in limited.items() for side in SIDES}
-        )
+        changed |= {f"{name}_{side}": value for name, value in limited.items() for side in SIDES}
         free |= dict.fromkeys(("lim1", "lim2"), Free(spread=WITHIN, tied=True))
-    return nominal, setup.model_copy(update={"free": free})
+    return nominal.with_numbers(changed), setup.model_copy(update={"free": free})
 
 
 def _bending_forces(nominal: ParameterSet, beyond: Mapping[str, float]) -> dict[str, Free]:
