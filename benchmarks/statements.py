@@ -80,5 +80,5 @@ def restored(entry):
     """The `discrepancy.PredictionError` that a verdict stores."""
     entry = dict(entry)
     entry["classes"] = tuple(discrepancy.ClassError(*each) for each in entry["classes"])
-    entry["beyond"] = tuple(discrepancy.BeyondTests(*each) for each in entry["beyond"])
+    entry["beyond"] = tuple(discrepancy.BeyondTests(*each) for each in entry.get("beyond", ()))
     return discrepancy.PredictionError(**entry)

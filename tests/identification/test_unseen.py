@@ -52,7 +52,7 @@ def test_other_drives_are_left_as_they_are() -> None:
     hoist = Drive.preset("hoist").parameters
     of_current = guessed(*READ_OFF, "lim1")
     assert with_unseen(hoist, whole_drive(hoist)) == (hoist, whole_drive(hoist))
-    nominal, setup = with_unseen(of_current, whole_drive(of_current))
+    _, setup = with_unseen(of_current, whole_drive(of_current))
     assert "lim1" not in setup.free or not setup.free["lim1"].tied  # read off the current
     assert {"G2_plus", "J_plus"} <= setup.free.keys()
     assert not is_guessed(hoist)

@@ -41,6 +41,9 @@ HYSTERESIS = ("solenoid_hysteresis", "spool_friction")
 """Parameters by which a drive has a hysteresis of its own."""
 ROUNDING = 1e-9
 """Noise of a command, over its largest value, that is rounding. [1]"""
+AT_REST, RESTING = 50, 0.1
+"""Samples of a window in which a command may rest, and the share of windows in which it does at
+least: a controller's steps on a ramp are no noise. [1]"""
 FEWEST_RUNS = 5
 """Runs from which it is estimated by how much they differ."""
 
@@ -142,7 +145,8 @@ def changes_of(experiment: Experiment, resolution: float) -> Iterator[Change]:
         yield Change(
             f"zero of the command{IN_RUN}{run}", replace(experiment, input=shifted_command), SMALL
         )
-    noise = _noise(command.values)
+    # what rounding makes counts as the zero
+    noise = sqrt(max(_noise(command.values) ** 2 - resolution**2 / 12.0, 0.0))
     if noise > ROUNDING * largest:
         noisier = command.values + SMALL * noise * np.sign(command.values)
         noisy_command = replace(command, values=np.clip(noisier, -largest, largest))
@@ -166,10 +170,13 @@ def changes_of(experiment: Experiment, resolution: float) -> Iterator[Change]:
 
 
 def _noise(values: Array) -> float:
-    """Standard deviation of white noise in (n,) readings; 0 of those that are mostly equal."""
+    """Standard deviation of white noise in (n,) readings of a command, where that rests."""
     # 20 = 1 + 9 + 9 + 1, of the squares of a third difference
-    differences = np.abs(np.diff(values, 3))
-    return float(np.median(differences)) / (0.6745 * sqrt(20.0)) if differences.size else 0.0
+    squares = np.diff(values, 3) ** 2 / 20.0
+    windows = squares[: squares.size // AT_REST * AT_REST].reshape(-1, AT_REST)
+    if not windows.size:
+        return 0.0
+    return sqrt(float(np.quantile(windows.mean(axis=1), RESTING)))
 
 
 def after_play(values: Array, width: float) -> Array:
