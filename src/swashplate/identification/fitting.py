@@ -302,6 +302,8 @@ def fit(
         )
         stated = _of_model(user_defined, runs)
     nominal, setup = stated.nominal, stated.setup
+    if is_whole_drive(setup, nominal):
+        nominal, setup = with_unseen(nominal, setup)
     doubts += stated.doubts
 
     def found(setup: FitSetup, solved: _Solved) -> Fit:
@@ -350,8 +352,6 @@ def fit(
             problem = weighed(problem, solution.vector)
         return found(setup, _Solved(problem, solution))
 
-    if is_whole_drive(setup, nominal):
-        nominal, setup = with_unseen(nominal, setup)
     with working(f"Fitting {nominal.name}"):
         settled = settle(runs, smooth(nominal), setup, loss=loss, threads=threads)
         runs = settled.runs
