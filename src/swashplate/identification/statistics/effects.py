@@ -41,9 +41,9 @@ HYSTERESIS = ("solenoid_hysteresis", "spool_friction")
 """Parameters by which a drive has a hysteresis of its own."""
 ROUNDING = 1e-9
 """Noise of a command, over its largest value, that is rounding. [1]"""
-AT_REST, RESTING = 50, 0.1
-"""Samples of a window in which a command may rest, and the share of windows in which it does at
-least: a controller's steps on a ramp are no noise. [1]"""
+WINDOW, AT_REST, CALMEST = 50, 0.02, 0.1
+"""Samples over which a command is looked at, part of its range by which it moves at most at rest,
+and the share of such windows that say how large its noise is. [1]"""
 FEWEST_RUNS = 5
 """Runs from which it is estimated by how much they differ."""
 
@@ -170,13 +170,17 @@ def changes_of(experiment: Experiment, resolution: float) -> Iterator[Change]:
 
 
 def _noise(values: Array) -> float:
-    """Standard deviation of white noise in (n,) readings of a command, where that rests."""
-    # 20 = 1 + 9 + 9 + 1, of the squares of a third difference
-    squares = np.diff(values, 3) ** 2 / 20.0
-    windows = squares[: squares.size // AT_REST * AT_REST].reshape(-1, AT_REST)
-    if not windows.size:
+    """Standard deviation of white noise in (n,) readings of a command, where that rests; 0 if not.
+
+    A controller's steps on a ramp are no noise, nor is a motion of the stick.
+    """
+    windows = values[: values.size // WINDOW * WINDOW].reshape(-1, WINDOW)
+    resting = windows[np.ptp(windows, axis=1) < AT_REST * np.ptp(values)]
+    if not resting.size:
         return 0.0
-    return sqrt(float(np.quantile(windows.mean(axis=1), RESTING)))
+    # 20 = 1 + 9 + 9 + 1, of the squares of a third difference
+    squares = np.mean(np.diff(resting, 3, axis=1) ** 2, axis=1) / 20.0
+    return sqrt(float(np.quantile(squares, CALMEST)))
 
 
 def after_play(values: Array, width: float) -> Array:
