@@ -40,6 +40,8 @@ Maneuvers, and some of the options that may follow their numbers:
   step:9,stop=4,length=8  an option is written name=value
   "step +9 V"             a test of Kruse (2001), by its name
 """
+USAGE_ERROR: type[Exception] = typer.BadParameter.__mro__[1]
+"""What the parser raises, also of an option that there is not, which it names."""
 GONE = {
     "--folds": "give some runs role = 'validate', which the fit does not see and is judged by",
     "--joint": "all numbers are estimated at once",
@@ -155,7 +157,7 @@ class Commands(TyperGroup):
             say_error(error)
         except MemoryError:
             say_error(MemoryError("There is not enough memory for that many samples"))
-        except Exception as error:  # of the parser, which names the option
+        except USAGE_ERROR as error:
             option = getattr(error, "option_name", "")
             if option not in GONE:
                 raise

@@ -440,10 +440,10 @@ def _fitted_form(
             smooth(start),
             [jumping.get(key, run) for key, run in runs.items()],
         )
-        found = solve(problem, tolerance=TOLERANCE, max_evaluations=EVALUATIONS)
+        solution = solve(problem, tolerance=TOLERANCE, max_evaluations=EVALUATIONS)
     except SwashplateError:
         return as_tried
-    values = problem.unknowns.values(found.vector)
+    values = problem.unknowns.values(solution.vector)
     for symbol, (plus, minus) in numbers.items():
         plus, minus = values.get(f"{symbol}_plus", plus), values.get(f"{symbol}_minus", minus)
         if not all(tried):

@@ -488,10 +488,10 @@ def coloured_noise_covariance(fit: LinearisedFit) -> Covariance:
 
 def _widened(covariance: Covariance, other: Covariance) -> Covariance:
     """A covariance with the variances of another along the axes on which that has larger ones."""
-    known = covariance.determined & other.determined
-    known &= (covariance.standard_errors > 0.0) & (other.standard_errors > 0.0)
-    part = np.ix_(known, known)
-    sizes = covariance.standard_errors[known]
+    compared = covariance.determined & other.determined
+    compared &= (covariance.standard_errors > 0.0) & (other.standard_errors > 0.0)
+    part = np.ix_(compared, compared)
+    sizes = covariance.standard_errors[compared]
     units = np.outer(sizes, sizes)
     variances, axes = np.linalg.eigh(covariance.matrix[part] / units)
     others = np.sum((other.matrix[part] / units) @ axes * axes, axis=0)

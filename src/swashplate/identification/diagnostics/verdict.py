@@ -194,10 +194,10 @@ class Verdict(Result):
                 )
             beyond = [part for part in prediction.beyond if part.error > prediction.worst.error]
             if beyond:
-                known = [f"{percent(part.error)} in {part.motion}" for part in beyond]
+                errors = [f"{percent(part.error)} in {part.motion}" for part in beyond]
                 sentences += (
                     f" Faster than any test {prediction.signal} is known only within "
-                    f"{listed(known)}, with the largest commands."
+                    f"{listed(errors)}, with the largest commands."
                 )
         return sentences
 

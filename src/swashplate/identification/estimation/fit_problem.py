@@ -242,8 +242,8 @@ def whole_drive(
             if number != 0.0 and np.isfinite(number)
         ]
         names = [symbol] if len(moved) == len(parameter.numbers) else moved
-        known = max(spread, READ_OFF) if is_read_off(parameters, symbol) else spread
-        free |= {name: Free(spread=known) for name in names}
+        spread_of_symbol = max(spread, READ_OFF) if is_read_off(parameters, symbol) else spread
+        free |= {name: Free(spread=spread_of_symbol) for name in names}
     title = f"every number of {parameters.name}, known to within {100.0 * spread:g} %"
     return FitSetup(title=title, part=part, free=free)
 

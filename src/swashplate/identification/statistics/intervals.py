@@ -507,13 +507,13 @@ def weighed(problem: Problem, vector: Array) -> Problem:
     fit = linearised_fit(replace(problem, unknowns=problem.unknowns.with_worths(None)), vector)
     covariance = spectral_covariance(fit)
     assumed = np.sum(fit.whitening**2, axis=1)
-    known = [
+    deviations = [
         np.inf if unknown.prior is None else unknown.prior.deviation for unknown in problem.unknowns
     ]
     logarithmic = [unknown.log for unknown in problem.unknowns]
-    widths = np.array(known) / np.where(logarithmic, 1.0, problem.unknowns.scales)
-    told = np.diag(covariance.matrix) < widths**2
-    determined = covariance.determined & (assumed > 0.0) & told
+    widths = np.array(deviations) / np.where(logarithmic, 1.0, problem.unknowns.scales)
+    narrower_than_prior = np.diag(covariance.matrix) < widths**2
+    determined = covariance.determined & (assumed > 0.0) & narrower_than_prior
     ratio = np.diag(covariance.matrix)[determined] / assumed[determined]
     ratios = np.full(determined.size, float(np.median(ratio)) if determined.any() else 1.0)
     ratios[determined] = ratio
