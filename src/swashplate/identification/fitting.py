@@ -394,7 +394,8 @@ def _asked_for(
         fit = rough(setup, fit.values | late, {})
         if fit.interrupted:
             return _Asked(setup, near, fit)
-    freed = less_of_currents(fit)
+    # of a named drive, whose amplifier is known beforehand, the currents count in full
+    freed = less_of_currents(fit) if is_guessed(nominal) else None
     if freed is None:
         return _Asked(setup, fit.values)
     return _Asked(with_weight_of_currents(setup, freed.factor), freed.values)
