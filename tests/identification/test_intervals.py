@@ -416,7 +416,7 @@ def test_estimates_follow_a_fixed_number_as_in_a_fit_with_another(
     found = fit(published, campaign, stated(**DOUBTS))
     value = published.parameters.numbers[name]
     deviation *= value if name == "Z9" else 1.0
-    step, ends = 0.05 * deviation, []
+    step, ends = 0.5 * deviation, []
     for sign in (1.0, -1.0):
         moved = published.replace(**{name: value + sign * step})
         ends.append(fit(moved, campaign, stated()).solution.vector)
@@ -425,9 +425,10 @@ def test_estimates_follow_a_fixed_number_as_in_a_fit_with_another(
     expected = ((ends[0] - ends[1]) * (deviation / (2.0 * step)))[told]
     changes = known.systematic[f"uncertainty of {name}"][told]
     # Gauss and Newton leave out the residuals' curvature, and where the filter sticks in its
-    # Coulomb band, which moves weak unknowns by about their own standard error
+    # Coulomb band, which moves weak unknowns by about their own standard error in each of two fits
     errors = known.own.standard_errors[told]
-    assert (np.abs(changes - expected) < 0.1 * np.abs(expected) + errors).all()
+    allowed = 0.1 * np.abs(expected) + np.sqrt(2.0) * errors
+    assert (np.abs(changes - expected) < allowed).all()
     assert (np.abs(changes) > 2.0 * errors).any()
     assert (known.quoted.standard_errors[told] >= errors).all()
     assert any("fixed parameters" in words for words in known.sentences())

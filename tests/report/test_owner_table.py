@@ -101,7 +101,8 @@ def test_numbers_of_what_was_tested_hold(found: Fit) -> None:
     assert numbers.commands == truth.commands == (8.0, 7.0)
     for number in numbers.numbers:
         if number.name in ("jump", "creep"):  # the winch has none
-            assert (number.value, number.note) == (0.0, "not seen")
+            assert abs(number.value or 0.0) < 1e-3
+            assert number.unseen or number.note == "not seen"
             continue
         low, high = number.interval
         assert low is not None
@@ -167,16 +168,20 @@ def test_an_estimate_at_its_bound_keeps_its_interval_and_is_named(
 
 
 @pytest.mark.slow
-def test_a_spread_is_that_of_the_covariance(found: Fit) -> None:
-    """Of the dead zone it is that of V_dz, as the jump is none: own errors and systematic ones."""
+def test_a_dead_zone_is_known_beside_a_jump_that_makes_up_for_it_at_first(found: Fit) -> None:
+    """A profile ends where no derivative says so, and the dead zone's spread is the profile's."""
 
     def dead_zones(drive: Drive) -> np.ndarray:
         return np.array([drive.parameters.numbers[f"V_dz_{way}"] for way in WAYS])
 
     spread = spread_of(found, dead_zones)
-    errors = np.array([found[f"V_dz_{way}"].standard_error for way in WAYS])
-    # bounds of the search count as a prior there, so that it may be a little narrower
-    assert spread.half == pytest.approx(1.96 * errors, rel=0.05)
+    for way, half in zip(WAYS, spread.half, strict=True):
+        estimate = found[f"V_dz_{way}"]
+        low, high = estimate.interval
+        # to first order, where the interval is that of the logarithm
+        assert half == pytest.approx(max(high - estimate.value, estimate.value - low), rel=0.2)
+        assert half < 0.3 * estimate.value
+        assert abs(dict(plus=0.8, minus=0.6)[way] - estimate.value) < half
     assert not spread.below.any()
     assert not spread.above.any()
 

@@ -216,7 +216,7 @@ def _within_bounds(fit: Optimum) -> Array:
 
 def _of_tests(fit: Optimum) -> Array:
     """Covariance (K, K) of the vector as the tests tell it, 0 of what they do not."""
-    covariance = uncertainty_of(fit).own.matrix
+    covariance = uncertainty_of(fit).within_ends
     return np.where(np.isfinite(covariance), covariance, 0.0)
 
 

@@ -41,6 +41,8 @@ MEANINGS = {
 INTERVALS = "With 95 % intervals of the fit, rounded up, which do not cover unmodelled effects."
 EXACT = 1e-9
 """Half width over the value up to which an interval counts as none. [1]"""
+AS_GOOD_AS_NONE = 0.01
+"""Value over the half width of its interval up to which it counts as 0. [1]"""
 LOPSIDED = 1.2
 """Ratio of an interval's two sides from which both of its ends are shown."""
 
@@ -346,8 +348,9 @@ def _decimals(value: float, half: float) -> int:
     """As many as an interval gives sense to, and no more than an engineer would write down."""
     decimals = 1 - floor(log10(half))
     decimals = min(decimals, 3 - floor(log10(max(abs(value), half))))
-    # of a number that is hardly known its size remains
-    return max(decimals, 1 - floor(log10(abs(value))) if value else 0, 0)
+    # of a number that is hardly known its size remains, but of one that is as good as 0
+    known = abs(value) > AS_GOOD_AS_NONE * half
+    return max(decimals, 1 - floor(log10(abs(value))) if known else 0, 0)
 
 
 def _unsigned_zero(number: str) -> str:

@@ -251,6 +251,14 @@ class Unknowns(Result):
         return np.array([unknown.scale for unknown in self.items])
 
     @cached_property
+    def prior_widths(self) -> Array:
+        """(K,) standard deviations of the priors in the solver's vector; inf without one."""
+        deviations = [
+            np.inf if unknown.prior is None else unknown.prior.deviation for unknown in self.items
+        ]
+        return np.array(deviations) / np.where(self.logarithmic, 1.0, self.scales)
+
+    @cached_property
     def start(self) -> Array:
         """(K,) vector of the nominal values."""
         return self.to_vector(np.array([unknown.start for unknown in self.items]))

@@ -28,9 +28,9 @@ where the model no longer holds, or at a cost below the optimum's."""
 STRIDE = 0.35
 """Step aimed at, in the square root of the cost's rise over that of the threshold: three points
 a side on a parabola."""
-BETTER = 0.02
+BETTER = 0.3
 """Part of the threshold by which a cost must lie below the optimum's to be a better optimum: a
-smaller difference moves the ends of an interval by less than 1 % of their distance."""
+search ends a little above it, and ends are counted from the least cost that was met."""
 CLOSE = 1e-3
 """Relative error in the root of the cost's rise at which a crossing counts as found."""
 CLOSE_ENOUGH = 0.005
@@ -121,7 +121,8 @@ class _Walk:
         if cost < self.optimum.cost - BETTER * self.rise:
             raise _BetterOptimumError(Point(number, float(cost), vector))
         self.points.append(Point(number, float(cost), vector))
-        return float(np.sqrt(max(cost - self.optimum.cost, 0.0) / self.rise))
+        least = min(self.optimum.cost, *(point.cost for point in self.points))
+        return float(np.sqrt(max(cost - least, 0.0) / self.rise))
 
     def outwards(self, step: float, reach: float, most: int) -> tuple[Ending, float | None]:
         """Ending of the side, and how far from the optimum the cost has risen just enough."""
@@ -262,6 +263,10 @@ def checked_ends(
     So it is where an end lies beyond a bound at which the cost has risen by more than it should: an
     unknown that next to nothing moves here may well be told farther off.
 
+    And so it is where two thresholds make up for each other only at first: a dead zone that grows
+    with a jump at its edge moves the drive over as much of the command as it has grown, and so by
+    its square. The derivative leaves both as they were known beforehand. The cost says more.
+
     A level that a drive keeps may be a stop, or the balance of its forces: two optima far apart. So
     each limit is also put out of the way, at its upper bound, and all else fitted again; if that
     costs less than the interval's end would, the data do not need the limit, and it has no upper
@@ -279,6 +284,7 @@ def checked_ends(
             continue
         direction = inverse[index] / inverse[index, index]
         rise = 0.5 * reach[index] ** 2 / inverse[index, index]
+        beforehand = problem.unknowns.prior_widths[index]
         alone = index in limits and np.abs(np.delete(direction, index)).max(initial=0.0) < ALONE
         if index in limits and _unneeded(problem, vector, index, cost, rise):
             yield CheckedEnd(index, True, np.inf)
@@ -290,17 +296,19 @@ def checked_ends(
             except DomainError:
                 continue  # beyond the model's domain nothing is possible
             room = abs(float(bound - vector[index]))
-            shallow = risen < SHALLOW * rise
-            if alone and risen > STEEP * rise:
+            shallow, first = risen < SHALLOW * rise, float(reach[index])
+            steep = risen > STEEP * rise and (alone or (bends and drive and first > beforehand))
+            if steep:
                 along = sign * reach[index] * direction
-                part = _part_within(problem, vector, along, cost + rise)
-                yield CheckedEnd(index, sign > 0.0, part * float(reach[index]))
-                continue
-            if not (shallow or (risen > rise and reach[index] > room > 0.0)):
+                first *= _part_within(problem, vector, along, cost + rise)
+                if alone:
+                    yield CheckedEnd(index, sign > 0.0, first)
+                    continue
+            if not (shallow or steep or (risen > rise and first > room > 0.0)):
                 continue
             optimum = Point(float(vector[index]), cost, vector)
             least = LEAST_STEP * float(high[index] - low[index])
-            step = sign * max(min(float(reach[index]), room), least)
+            step = sign * max(min(first, room), least)
             tolerance = float(np.clip(SETTLED * rise / cost, 1e-8, 1e-4)) if cost > 0.0 else 1e-6
             minimise = minimiser(problem, tolerance=tolerance, max_evaluations=TRIES)
             side = side_of(

@@ -45,6 +45,8 @@ Systematic = Mapping[str, Array]
 DECADES = 100.0
 """Factor each way from which an interval says nothing; for an unknown that is not logarithmic, half
 width in its scales."""
+ALONE = 0.01
+"""Largest correlation of an error that goes with no other. [1]"""
 LEAST = 1e-6
 """Smallest worth of a prior: residuals that are all but zero leave it its say on what they leave
 open."""
@@ -272,6 +274,33 @@ class Uncertainty(Result):
     def quoted(self) -> Covariance:
         """The own one with systematic effects."""
         return with_effects(self.own, self.systematic)
+
+    @cached_property
+    def within_ends(self) -> Array:
+        """(K, K) own covariance with the ends that were found nearer than it says.
+
+        Notes
+        -----
+        That one unknown has the standard error s' instead of s leaves of a covariance C, with its
+        column c, C − (1 - s'²/s²) c cᵀ/s²: what makes up for it has less to make up for.
+
+        The nearer of two ends counts of a limit that goes with nothing else: one that is just not
+        reached has it towards what the tests reached, and beyond it lies what no motion like theirs
+        shows. Of all others the farther one counts.
+        """
+        widths, covariance = reach(self.own), self.own.matrix.copy()
+        correlation = np.abs(self.own.correlation)
+        np.fill_diagonal(correlation, 0.0)
+        for number in {end.number for end in self.ends}:
+            sides = {end.upper: end.distance for end in self.ends if end.number == number}
+            alone = correlation[number].max(initial=0.0) < ALONE
+            distances = [sides.get(upper, widths[number]) for upper in (False, True)]
+            distance = min(distances) if alone else max(distances)
+            if distance < widths[number]:
+                column = covariance[number] / np.sqrt(covariance[number, number])
+                within = (distance / widths[number]) ** 2
+                covariance -= (1.0 - within) * np.outer(column, column)
+        return covariance
 
     @cached_property
     def estimates(self) -> tuple[Estimate, ...]:
@@ -507,12 +536,7 @@ def weighed(problem: Problem, vector: Array) -> Problem:
     fit = linearised_fit(replace(problem, unknowns=problem.unknowns.with_worths(None)), vector)
     covariance = spectral_covariance(fit)
     assumed = np.sum(fit.whitening**2, axis=1)
-    deviations = [
-        np.inf if unknown.prior is None else unknown.prior.deviation for unknown in problem.unknowns
-    ]
-    logarithmic = [unknown.log for unknown in problem.unknowns]
-    widths = np.array(deviations) / np.where(logarithmic, 1.0, problem.unknowns.scales)
-    narrower_than_prior = np.diag(covariance.matrix) < widths**2
+    narrower_than_prior = np.diag(covariance.matrix) < problem.unknowns.prior_widths**2
     determined = covariance.determined & (assumed > 0.0) & narrower_than_prior
     ratio = np.diag(covariance.matrix)[determined] / assumed[determined]
     ratios = np.full(determined.size, float(np.median(ratio)) if determined.any() else 1.0)

@@ -14,11 +14,9 @@ from swashplate.identification.estimation.posterior import Posterior
 from swashplate.identification.estimation.unknowns import Unknowns
 from swashplate.identification.optimum import Optimum
 from swashplate.identification.statistics.effects import effect_of_fixed
-from swashplate.identification.statistics.intervals import Uncertainty, reach, uncertainty_of
+from swashplate.identification.statistics.intervals import uncertainty_of
 
 Array = NDArray[np.float64]
-ALONE = 0.01
-"""Largest correlation of an error that goes with no other. [1]"""
 NEGLIGIBLE = 1e-9
 """Share of the largest singular value below which an error counts as none. [1]"""
 
@@ -34,9 +32,7 @@ def posterior_of(fit: Optimum) -> Posterior:
     uncertainty = uncertainty_of(fit)
     unknowns = fit.problem.unknowns
     shared = unknowns.shared
-    nearer = _nearer_ends(uncertainty)
-    matrix = nearer[:, None] * uncertainty.own.matrix * nearer
-    variances, axes = np.linalg.eigh(matrix[np.ix_(shared, shared)])
+    variances, axes = np.linalg.eigh(uncertainty.within_ends[np.ix_(shared, shared)])
     own = np.zeros((len(unknowns), variances.size))
     own[shared] = np.sqrt(np.maximum(variances, 0.0)) * axes
     systematic = [change[:, None] for change in uncertainty.systematic.values()]
@@ -45,24 +41,6 @@ def posterior_of(fit: Optimum) -> Posterior:
     rows |= _of_numbers(fit, errors)
     names = [name for name, row in rows.items() if row.any()]
     return Posterior(tuple(names), _compressed(np.array([rows[name] for name in names])))
-
-
-def _nearer_ends(uncertainty: Uncertainty) -> Array:
-    """(K,) by how much smaller an error is than the linearised one, if an end was found nearer.
-
-    A limit that is just not reached has its nearer end towards what the tests reached; beyond it
-    lies what no motion like theirs shows. Only of one whose error goes with no other: of two that
-    make up for each other, neither can be smaller by itself.
-    """
-    half_widths = reach(uncertainty.own)
-    correlation = np.abs(uncertainty.own.correlation)
-    np.fill_diagonal(correlation, 0.0)
-    nearer = np.ones(half_widths.size)
-    for end in uncertainty.ends:
-        width = half_widths[end.number]
-        if width > 0.0 and correlation[end.number].max(initial=0.0) < ALONE:
-            nearer[end.number] = min(nearer[end.number], end.distance / width)
-    return nearer
 
 
 def _of_fixed(fit: Optimum, effects: list[str], first: int, count: int) -> dict[str, Array]:
