@@ -80,12 +80,13 @@ def find_dropouts(experiment: Experiment, signal: Channel | InputSignal) -> list
     firsts, stops = np.append(0, changes), np.append(changes, values.size)
     long = stops - firsts >= fewest
     half = 0.5 * float(np.median(np.diff(time)))
+    levels = np.unique(values)
     found = list[Dropout]()
     for first, stop in zip(firsts[long].tolist(), stops[long].tolist(), strict=True):
         begin, end = float(time[first]) - half, float(time[stop - 1]) + half
         if end - begin > min(LONGEST, 0.5 * float(time[-1] - time[0])):
             continue
-        loss = _loss(experiment, signal, values, (first, stop), (begin, end))
+        loss = _loss(experiment, signal, values, levels, (first, stop), (begin, end))
         if loss is not None:
             found.append(Dropout(begin, end, float(values[first]), loss))
     return found
@@ -95,14 +96,18 @@ def _loss(
     experiment: Experiment,
     signal: Channel | InputSignal,
     values: Array,
+    levels: Array,
     rows: tuple[int, int],
     window: tuple[float, float],
 ) -> Loss | None:
-    """What became of a signal with values (n,) within a stretch of rows; None if it is sound."""
+    """What became of a signal with values (n,) within a stretch of rows; None if it is sound.
+
+    `levels` are its values in order, each once.
+    """
     first, stop = rows
     value = float(values[first])
-    others = values[values != value]
-    low, high = float(others.min()), float(others.max())
+    low = float(levels[0] if levels[0] != value else levels[1])
+    high = float(levels[-1] if levels[-1] != value else levels[-2])
     far_off = high > low and not 2.0 * low - high <= value <= 2.0 * high - low
     at_an_end = first < 2 or stop > values.size - 2
     # a log may begin or end with an instrument that is off
@@ -117,26 +122,30 @@ def _loss(
         return None
     largest_step = max(float(np.abs(step).max()) for step in steps)
     arrives, leaves = value - float(values[first - 1]), float(values[stop]) - value
-    noisy = all(_is_noisy(step) for step in steps)
-    repeats = max(float(np.mean(step == 0.0)) for step in steps)
-    # none among so many may still be three in a hundred: the rule of three
-    repeats = max(repeats, 3.0 / sum(step.size for step in steps))
-    by_chance = values.size * min(repeats, 1.0) ** (stop - first)
     is_input = isinstance(signal, InputSignal)
-    if is_input:
-        unexplained = noisy or _unanswered(experiment, window)
-    else:
-        unexplained = not _command_jumps(experiment.input, window)
-    least_jump = max(SUDDEN * largest_step, LARGE * float(np.ptp(values)))
+
+    def noisy() -> bool:
+        return all(_is_noisy(step) for step in steps)
+
+    def unexplained() -> bool:
+        if is_input:
+            return noisy() or _unanswered(experiment, window)
+        return not _command_jumps(experiment.input, window)
+
+    least_jump = max(SUDDEN * largest_step, LARGE * float(levels[-1] - levels[0]))
     comes_back = arrives * leaves < 0.0 and abs(arrives + leaves) < 0.5 * abs(arrives)
-    if unexplained and comes_back and min(abs(arrives), abs(leaves)) > least_jump:
+    if comes_back and min(abs(arrives), abs(leaves)) > least_jump and unexplained():
         return "fallen"
     # a motion that passes zero meanwhile does not come back to the side that it left
     falls = abs(arrives) > max(least_jump, MOVES * max(abs(low), abs(high)))
     starts_suddenly = abs(leaves) > STARTS * largest_step
-    if unexplained and value == 0.0 and not is_input and falls and starts_suddenly:
+    if value == 0.0 and not is_input and falls and starts_suddenly and unexplained():
         return "fallen"
-    if by_chance > CHANCE or (is_input and not noisy):
+    repeats = max(float(np.mean(step == 0.0)) for step in steps)
+    # none among so many may still be three in a hundred: the rule of three
+    repeats = max(repeats, 3.0 / sum(step.size for step in steps))
+    by_chance = values.size * min(repeats, 1.0) ** (stop - first)
+    if by_chance > CHANCE or (is_input and not noisy()):
         return None
     if isinstance(signal, Channel) and signal.is_position:
         fastest = float(np.quantile(np.abs(_moved(values, stop - first)), 0.99))
@@ -145,8 +154,8 @@ def _loss(
         frozen = fast and moved[0] * moved[1] > 0.0
     else:
         in_motion = abs(value) > MOVES * max(abs(low), abs(high))
-        frozen = in_motion and low < value < high and (noisy or abs(leaves) > least_jump)
-    return "frozen" if frozen and unexplained else None
+        frozen = in_motion and low < value < high and (noisy() or abs(leaves) > least_jump)
+    return "frozen" if frozen and unexplained() else None
 
 
 def _is_mark(

@@ -470,7 +470,8 @@ def _solved(
             start = approached(problem, loss=solver.keywords["loss"])
         first = solver
         if setup.has_spreads:
-            first = partial(solver, tolerance=max(limits["tolerance"], BEFORE_WEIGHING))
+            roughly = max(limits["tolerance"], BEFORE_WEIGHING)
+            first = partial(solver, tolerance=roughly, cliffs=0)
         solution = first(problem, start, hopeless=hopeless)
         solutions = ()
         planned = 1 + OTHERS

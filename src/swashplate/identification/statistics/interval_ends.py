@@ -33,12 +33,12 @@ BETTER = 0.3
 search ends a little above it, and ends are counted from the least cost that was met."""
 CLOSE = 1e-3
 """Relative error in the root of the cost's rise at which a crossing counts as found."""
-CLOSE_ENOUGH = 0.005
+CLOSE_ENOUGH = 0.03
 """The same of an interval's end that is looked for again: of its half width."""
-SETTLED = 0.01
+SETTLED = 0.03
 """Part of the cost's rise to a threshold by which the others, fitted, need not fall any further."""
-FURTHEST, MOST, HALVINGS = 300.0, 40, 6
-"""Largest distance looked at, in first steps; most points a side; and how often a step is halved at
+FURTHEST, MOST, HALVINGS = 1000.0, 40, 6
+"""Largest distance looked at, in first distances; most points a side; and how often a step is halved at
 the edge of the model's domain."""
 
 
@@ -71,21 +71,31 @@ def side_of(
     rise: float,
     step: float,
     bound: float,
-    most: int = MOST,
-    close: float = CLOSE,
 ) -> ProfileSide:
     """Outwards until the cost has risen enough, or something else ends the side.
 
-    `step` is that of about one standard error, negative downwards; `most` points are looked at, and
-    a crossing is found when the root of the cost's rise is as `close`.
+    `step` is that of about one standard error, negative downwards.
     """
-    walk = _Walk(minimise, optimum, index, rise, float(np.sign(step)), close)
-    try:
-        ending, distance = walk.outwards(abs(step), abs(bound - optimum.number), most)
-    except _BetterOptimumError as error:
-        return ProfileSide(walk.points, "better optimum", better=error.args[0])
-    end = None if distance is None else optimum.number + walk.sign * distance
-    return ProfileSide(walk.points, ending, end)
+    walk = _Walk(minimise, optimum, index, rise, float(np.sign(step)))
+    return walk.side(STRIDE * abs(step), bound, MOST)
+
+
+def end_of(
+    minimise: Minimise,
+    optimum: Point,
+    index: int,
+    rise: float,
+    step: float,
+    bound: float,
+    others: Array,
+) -> ProfileSide:
+    """The same for an end alone: to `CLOSE_ENOUGH`, the first point a whole step away.
+
+    `others` (K,) are changes of the vector for one of the unknown's number, as linear theory has
+    them: each search begins there.
+    """
+    walk = _Walk(minimise, optimum, index, rise, float(np.sign(step)), CLOSE_ENOUGH, others)
+    return walk.side(abs(step), bound, MOST_POINTS)
 
 
 @dataclass(frozen=True, eq=False)
@@ -101,7 +111,18 @@ class _Walk:
     """1 upwards, -1 downwards."""
     close: float = CLOSE
     """See `CLOSE`."""
+    others: Array | None = None
+    """See `end_of`; none if the others begin where they were at the nearest point."""
     points: list[Point] = field(default_factory=list)
+
+    def side(self, stride: float, bound: float, most: int) -> ProfileSide:
+        """The side, from a first distance on."""
+        try:
+            ending, distance = self.outwards(stride, abs(bound - self.optimum.number), most)
+        except _BetterOptimumError as error:
+            return ProfileSide(self.points, "better optimum", better=error.args[0])
+        end = None if distance is None else self.optimum.number + self.sign * distance
+        return ProfileSide(self.points, ending, end)
 
     def height(self, distance: float) -> float | None:
         """Root of the least cost's rise over the threshold's; None outside the model's domain.
@@ -111,6 +132,8 @@ class _Walk:
         number = self.optimum.number + self.sign * distance
         near = min((self.optimum, *self.points), key=lambda point: abs(point.number - number))
         start = near.vector.copy()
+        if self.others is not None:
+            start += (number - near.number) * self.others
         start[self.index] = number
         try:
             cost, vector = self.minimise(self.index, number, start)
@@ -124,16 +147,16 @@ class _Walk:
         least = min(self.optimum.cost, *(point.cost for point in self.points))
         return float(np.sqrt(max(cost - least, 0.0) / self.rise))
 
-    def outwards(self, step: float, reach: float, most: int) -> tuple[Ending, float | None]:
+    def outwards(self, stride: float, reach: float, most: int) -> tuple[Ending, float | None]:
         """Ending of the side, and how far from the optimum the cost has risen just enough."""
         near = low = 0.0
-        stride = STRIDE * step
+        furthest = FURTHEST * stride
         halvings = 0
         while len(self.points) < most:
             distance = min(near + stride, reach)
             if distance <= near:
                 return "bound", None
-            if distance > FURTHEST * step:
+            if distance > furthest:
                 break
             height = self.height(distance)
             if height is None:
@@ -311,9 +334,7 @@ def checked_ends(
             step = sign * max(min(first, room), least)
             tolerance = float(np.clip(SETTLED * rise / cost, 1e-8, 1e-4)) if cost > 0.0 else 1e-6
             minimise = minimiser(problem, tolerance=tolerance, max_evaluations=TRIES)
-            side = side_of(
-                minimise, optimum, index, rise, step, float(bound), MOST_POINTS, CLOSE_ENOUGH
-            )
+            side = end_of(minimise, optimum, index, rise, step, float(bound), direction)
             distance = np.inf if side.end is None else abs(side.end - optimum.number)
             better = None if side.better is None else side.better.cost
             if not shallow and side.end is None:  # the linearised end holds
