@@ -38,7 +38,7 @@ CLOSE_ENOUGH = 0.03
 SETTLED = 0.03
 """Part of the cost's rise to a threshold by which the others, fitted, need not fall any further."""
 FURTHEST, MOST, HALVINGS = 1000.0, 40, 6
-"""Largest distance looked at, in first distances; most points a side; and how often a step is halved at
+"""Largest distance looked at, in first ones; most points a side; and how often a step is halved at
 the edge of the model's domain."""
 
 
