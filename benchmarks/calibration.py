@@ -46,7 +46,7 @@ from command_line import (
 from records import (
     coverage_cell,
     half_width,
-    has_own_hysteresis,
+    has_own_causes,
     holds,
     miss,
     missing,
@@ -267,7 +267,7 @@ def statement_row(group, records):
 def alarm_row(group, records):
     """Sound campaigns of which the verdict names a cause, or blames a run."""
     named = [record for record in records if record["causes"]]
-    wrong = [record for record in named if not has_own_hysteresis(record)]
+    wrong = [record for record in named if not has_own_causes(record)]
     texts = [f"{', '.join(record['causes'])} ({record['seed']})" for record in wrong]
     blamed = [
         f"{', '.join(record['blamed']) or record['unsound'][0]} ({record['seed']})"

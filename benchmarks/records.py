@@ -97,6 +97,12 @@ def has_own_hysteresis(record):
     return found is not None and own / 1.5 < found < 1.5 * own
 
 
+def has_own_causes(record):
+    """Whether all causes are the machine's own: its hysteresis, or the drift of its warming oil."""
+    other = [cause for cause in record["causes"] if not cause.startswith("drift of")]
+    return not other or has_own_hysteresis(record)
+
+
 def present(values):
     """The values that are there."""
     return [value for value in values if value is not None]

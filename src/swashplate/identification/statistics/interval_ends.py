@@ -185,7 +185,7 @@ def _crossing(
     low, high = low - 1.0, high - 1.0
     distance = far
     for _ in range(12):
-        if abs(high) <= close:
+        if abs(high) <= close or abs(far - near) <= close * close * far:
             break
         distance = far - high * (far - near) / (high - low)
         now = height(distance)
