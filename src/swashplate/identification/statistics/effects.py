@@ -32,9 +32,6 @@ Array = NDArray[np.float64]
 Changes = Mapping[str, Array]
 """Changes of the residuals of one run, (m,) by channel. [unit]"""
 
-SMALL = 0.02
-"""Part of a standard uncertainty of the command's zero by which it is moved for the derivative: a
-whole one may lie beyond a switch of the card, where the derivative is another one."""
 IN_RUN = " in "
 """What stands between an effect and the only run that it belongs to."""
 HYSTERESIS = ("solenoid_hysteresis", "spool_friction")
@@ -140,17 +137,18 @@ def changes_of(experiment: Experiment, resolution: float) -> Iterator[Change]:
     # a card takes no more than its full voltage, which a command may have reached
     largest = float(np.abs(command.values).max())
     if zero > 0.0:
-        shifted = np.clip(command.values + SMALL * zero, -largest, largest)
+        # all of it: a part may just pass a sample over the jump of the current, which is no slope
+        shifted = np.clip(command.values + zero, -largest, largest)
         shifted_command = replace(command, values=shifted)
         yield Change(
-            f"zero of the command{IN_RUN}{run}", replace(experiment, input=shifted_command), SMALL
+            f"zero of the command{IN_RUN}{run}", replace(experiment, input=shifted_command)
         )
     # what rounding makes counts as the zero
     noise = sqrt(max(_noise(command.values) ** 2 - resolution**2 / 12.0, 0.0))
     if noise > ROUNDING * largest:
-        noisier = command.values + SMALL * noise * np.sign(command.values)
-        noisy_command = replace(command, values=np.clip(noisier, -largest, largest))
-        yield Change("noise of the command", replace(experiment, input=noisy_command), SMALL)
+        noisier = np.clip(command.values + noise * np.sign(command.values), -largest, largest)
+        noisy_command = replace(command, values=noisier)
+        yield Change("noise of the command", replace(experiment, input=noisy_command))
     if accuracy.gain > 0.0:
         weaker = replace(command, values=command.values * (1.0 - accuracy.gain / sqrt(3.0)))
         yield Change("gain of the command", replace(experiment, input=weaker))
