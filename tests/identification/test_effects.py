@@ -56,7 +56,7 @@ def test_a_change_is_a_rectangular_limit_over_the_root_of_three() -> None:
     weaker = changes["gain of the command"].experiment.input.values
     assert weaker[-1] == pytest.approx(5.0 * (1.0 - 0.03 / sqrt(3.0)))
     zero = changes["zero of the command in run"]
-    assert zero.experiment.input.values[0] / zero.part == pytest.approx(0.6 / sqrt(3.0))
+    assert zero.experiment.input.values[0] == pytest.approx(0.6 / sqrt(3.0))
 
 
 def test_a_stated_zero_counts_without_the_steps_of_the_converter() -> None:
@@ -65,7 +65,7 @@ def test_a_stated_zero_counts_without_the_steps_of_the_converter() -> None:
     def zero(accuracy: Accuracy | None) -> float:
         given = replace(run, input=replace(run.input, accuracy=accuracy))
         changes = [each for each in changes_of(given, 0.06) if each.effect.startswith("zero")]
-        return sum((each.experiment.input.values[0] / each.part) ** 2 for each in changes)
+        return sum(each.experiment.input.values[0] ** 2 for each in changes)
 
     # variances of rectangular distributions: a third of the limit's square, a twelfth of a step's
     assert zero(Accuracy(zero=0.03)) == pytest.approx(0.03**2 / 3.0 + 0.06**2 / 12.0)
@@ -130,16 +130,12 @@ def test_estimates_follow_each_effect_as_a_fit_of_changed_runs_does() -> None:
     systematic, middle = uncertainty_of(found).systematic, found.solution.vector
     changed: dict[str, list[Experiment]] = {}
     for number, run in enumerate(runs):
-        for effect, experiment, part in changes_of(run, 0.0):
+        for effect, experiment in changes_of(run, 0.0):
             changed.setdefault(effect, list(runs))[number] = experiment
-            assert part in (1.0, 0.02)
     assert changed.keys() == systematic.keys()
     assert len(changed) == 6
     for effect, experiments in changed.items():
-        # the command's zero is moved by a part of its uncertainty
-        part = 0.02 if effect.startswith("zero") else 1.0
-        moved = fit(SETUP, experiments).solution.vector
-        expected = (moved - middle) / part
+        expected = fit(SETUP, experiments).solution.vector - middle
         size = max(np.abs(expected).max(), 1e-6)
         assert systematic[effect] == pytest.approx(expected, abs=0.1 * size)
 

@@ -103,8 +103,6 @@ class Change(NamedTuple):
     """In words; effects of one name in several runs are one."""
     experiment: Experiment
     """The run, its command or what was measured changed."""
-    part: float = 1.0
-    """Part of a standard uncertainty by which it was changed."""
 
 
 def changes_of(experiment: Experiment, resolution: float) -> Iterator[Change]:
@@ -200,13 +198,12 @@ def responses(fit: Optimum, number: int, resolution: float) -> Iterator[tuple[st
     experiment = fit.problem.experiments[number]
     simulation = SimulatedRun(fit, number)
     middle = simulation.of(experiment)
-    for effect, changed, part in changes_of(experiment, resolution):
+    for effect, changed in changes_of(experiment, resolution):
         changed_signals = simulation.of(changed) if _acts(fit, experiment, changed) else middle
         yield (
             effect,
             {
-                name: (changed_signals[name] - middle[name] - changed[name].values + channel.values)
-                / part
+                name: changed_signals[name] - middle[name] - changed[name].values + channel.values
                 for name, channel in experiment.channels.items()
                 if name in middle
             },
