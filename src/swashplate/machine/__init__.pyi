@@ -30,6 +30,7 @@ from .kernels import kernel as kernel
 from .linear.frequency_response import sweep as sweep
 from .linear.linearisation import linearize as linearize
 from .linear.settling import settle as settle
+from .marching.black_box import BlackBox as BlackBox
 from .marching.run import Machine as Machine
 from .marching.sensitivity import Sensitivities as Sensitivities
 from .marching.sensitivity import sensitivities as sensitivities
