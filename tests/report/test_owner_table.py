@@ -181,7 +181,7 @@ def test_a_dead_zone_is_known_beside_a_jump_that_makes_up_for_it_at_first(found:
         # to first order, where the interval is that of the logarithm
         assert half == pytest.approx(max(high - estimate.value, estimate.value - low), rel=0.2)
         assert half < 0.3 * estimate.value
-        assert abs(dict(plus=0.8, minus=0.6)[way] - estimate.value) < half
+        assert abs({"plus": 0.8, "minus": 0.6}[way] - estimate.value) < half
     assert not spread.below.any()
     assert not spread.above.any()
 

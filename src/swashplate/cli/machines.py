@@ -165,7 +165,7 @@ def machine_in(word: MachineWord) -> OwnMachine | Drive:
     """The machine, or the drive, that a word names."""
     from swashplate.drive import Drive
     from swashplate.identification import ModelSetup
-    from swashplate.identification.estimation import loaded_module
+    from swashplate.identification.estimation import loaded_module, measured
     from swashplate.machine import Machine, Model
 
     # a script may print: that is no part of what the command says
@@ -191,8 +191,14 @@ def machine_in(word: MachineWord) -> OwnMachine | Drive:
     if word.fitted and setup is None:
         raise InputError(f"{word.file} has no 'free', so that {word.fitted} is no fit of it.")
     if isinstance(found, Machine):
-        return _of_machine(found, word, setup, title)
-    return _of_model(found, word, setup, title)
+        own = _of_machine(found, word, setup, title)
+    else:
+        own = _of_model(found, word, setup, title)
+    if setup is None and name in (MACHINE, MODEL):
+        rate, substeps = (getattr(module, each, None) for each in ("rate", "substeps"))
+        measured(found, rate=rate, substeps=substeps)  # refuses what is none
+        own = replace(own, rate=rate, substeps=substeps)
+    return own
 
 
 def _lacks(word: MachineWord, module: ModuleType) -> str:
@@ -246,9 +252,9 @@ def _of_model(found: Model, word: MachineWord, setup: ModelSetup | None, title: 
             "Machine(model, ..., given=...) there."
         )
     machine = Machine(found, tuple_from(found.parameters, of_model), given=given)
-    return (
-        OwnMachine(machine, title) if setup is None else _as_fitted(machine, setup, numbers, title)
-    )
+    if setup is None:
+        return OwnMachine(machine, title)
+    return _as_fitted(machine, setup, numbers, title)
 
 
 def _nominal(setup: ModelSetup) -> dict[str, float]:
