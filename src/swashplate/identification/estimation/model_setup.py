@@ -137,6 +137,8 @@ class ModelSetup(Result):
         self._check_free_and_fixed(name)
         _check_numbers(f"{name}: the noise", self.noise, 0.0)
         _check_numbers(f"{name}: the fixed value", self.fixed, -inf)
+        ranges = [key for key, entry in self.free.items() if not isinstance(entry, Unknown)]
+        _check_names(machine, "free", ranges)
         free = {key: _unknown(key, entry, machine) for key, entry in self.free.items()}
         targets = [target for unknown in free.values() for target in unknown.targets]
         _check_names(machine, "free", targets)
