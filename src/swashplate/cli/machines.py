@@ -223,9 +223,10 @@ def _of_machine(
         return OwnMachine(found, title)
     numbers = dict(setup.fixed)
     if word.fitted:
-        numbers |= fitted_numbers(word, setup, [*found.numbers])
-    of_machine = {name: value for name, value in numbers.items() if name in found.numbers}
-    return _as_fitted(found.replace(of_machine), setup, _nominal(setup) | numbers, title)
+        of_machine = [name for name in found.numbers if not setup.measured.starts(name)]
+        numbers |= fitted_numbers(word, setup, of_machine)
+    changes = {name: value for name, value in numbers.items() if name in found.numbers}
+    return _as_fitted(found.replace(changes), setup, _nominal(setup) | numbers, title)
 
 
 def _of_model(found: Model, word: MachineWord, setup: ModelSetup | None, title: str) -> OwnMachine:

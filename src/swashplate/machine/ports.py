@@ -137,7 +137,10 @@ class StatedPorts:
     @cached_property
     def parameter_definitions(self) -> dict[str, Definition]:
         """See `Ports`."""
-        return {name: self.stated.get(name, Definition(name, "")) for name in self.parameters}
+        return {
+            name: self.stated.get(name, Definition(name.rpartition(".")[2], ""))
+            for name in self.parameters
+        }
 
     @cached_property
     def ranges(self) -> dict[str, Definition]:
