@@ -18,6 +18,7 @@ from swashplate import (
     Model,
     ParameterError,
     equation,
+    join,
 )
 from swashplate import identification as face
 from swashplate.identification import (
@@ -166,6 +167,39 @@ def test_the_givens_of_a_machine_hold_unless_a_run_has_its_own() -> None:
     assert fit(by_run, runs).values == pytest.approx(TRUTH, abs=0.02)
     with pytest.raises(InputError, match="its given must be a Depth, not 3"):
         fit(replace(by_run, given=3), runs)
+
+
+class Filter(NamedTuple):
+    time: float
+
+
+class Out(NamedTuple):
+    out: float
+
+
+@equation
+def smoothed(state: Out, command: float, p: Filter, h: float) -> Out:
+    return Out(command + exp(-h / p.time) * (state.out - command))
+
+
+def test_a_joined_machine_is_fitted_by_last_words() -> None:
+    """A filter before the tank, whose channels and numbers are called by their last words."""
+    before = Machine(Model("filter", Filter, Out, smoothed), Filter(0.1))
+    members = {"filter": before, "tank": MACHINE}
+    row = join("row", members, links={"tank.valve": "filter.out"})
+    test = trial(9)
+    shares = {name: exp(-1.0 / RATE / lag) for name, lag in (("filter", 0.5), ("tank", 0.3))}
+    out, level = test.input.values, np.zeros(COUNT)
+    out = lfilter([0.0, 1.0 - shares["filter"]], [1.0, -shares["filter"]], out)
+    aim = TRUTH["gain"] * out * test["supply"].values
+    level = lfilter([0.0, 1.0 - shares["tank"]], [1.0, -shares["tank"]], aim)
+    level += NOISE["level"] * np.random.default_rng(9).standard_normal(COUNT)
+    channels = {**test.channels, "level": replace(test["level"], values=level)}
+    free = {"gain": (0.1, 10.0), "tank.lag": (0.01, 3.0), "time": (0.01, 3.0)}
+    made = fit(row, [replace(test, channels=channels)], free, noise=NOISE)
+    expected = {"tank.gain": 2.0, "tank.lag": 0.3, "filter.time": 0.5}
+    assert made.values == pytest.approx(expected, abs=0.03)
+    assert made.parameters.numbers["tank.leak"] == 0.0
 
 
 def test_a_problem_takes_either_machine() -> None:

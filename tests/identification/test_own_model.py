@@ -37,7 +37,7 @@ from swashplate.identification import (
     solve,
     uncertainty_of,
 )
-from swashplate.identification.estimation.measured import measured
+from swashplate.identification.estimation.measured_machine import measured
 from swashplate.identification.estimation.model import linearised
 from swashplate.identification.estimation.problem import rounded_unknowns
 from swashplate.machine import BlackBox, Definition, Machine, Model, Tap, equation, simulate

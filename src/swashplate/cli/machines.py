@@ -20,8 +20,7 @@ if TYPE_CHECKING:
 
     from swashplate.drive import Drive, Simulation
     from swashplate.identification import ModelSetup
-    from swashplate.machine import Machine, Model, Run
-    from swashplate.machine.ports import Ports
+    from swashplate.machine import Machine, Model, Ports, Run
 
 MACHINE, MODEL = "machine", "model"
 """Names that stand for a file's machine if none is named, in this order."""

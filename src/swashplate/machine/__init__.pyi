@@ -45,5 +45,6 @@ from .model import SignalSource as SignalSource
 from .model import Tap as Tap
 from .model import Window as Window
 from .model import discretised as discretised
+from .ports import Ports as Ports
 from .replacement import Replacement as Replacement
 from .replacement import replaced as replaced

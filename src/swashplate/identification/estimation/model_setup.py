@@ -27,7 +27,7 @@ from swashplate.errors import (
     UnknownNameError,
     meant,
 )
-from swashplate.identification.estimation.measured import (
+from swashplate.identification.estimation.measured_machine import (
     MeasuredBlackBox,
     MeasuredEquations,
     MeasuredMachine,
@@ -44,6 +44,7 @@ from swashplate.identification.estimation.setup import (
 from swashplate.identification.estimation.solving import solve
 from swashplate.identification.estimation.unknowns import Unknown, Unknowns, zero_name
 from swashplate.machine.fields import check_mapping, is_real
+from swashplate.machine.model import full_name
 from swashplate.machine.plausible import check_plausible
 from swashplate.results import Result
 from swashplate.tables import listed
@@ -84,7 +85,8 @@ class ModelSetup(Result):
     that are not free stay as they are, as do its options and givens; of a `Model`, which has no
     numbers, each is free or `fixed`.
 
-    An entry of `free` is (low, high), which begins at the machine's number, (low, nominal, high),
+    Of a name that is a path the last word is enough where it is unique. An entry of `free` is
+    (low, high), which begins at the machine's number, (low, nominal, high),
     each with a unit behind it if you like, or an `Unknown`. A range of positive bounds, the upper
     one at least ten times the lower one, is searched by its logarithm. ``"start.PATH"`` of a state
     and ``"offset CHANNEL"``, the zero of a sensor, are free in each run by themselves.
@@ -94,9 +96,9 @@ class ModelSetup(Result):
     >>> from swashplate import FullOrderDrive
     >>> from swashplate.identification import ModelSetup
     >>> machine = FullOrderDrive.preset("hoist").by_current
-    >>> setup = ModelSetup(machine, {"machine.inertia": (10.0, 1000.0)}, rate=512.0)
-    >>> setup.free["machine.inertia"].start == machine.numbers["machine.inertia"]
-    True
+    >>> setup = ModelSetup(machine, {"load_inertia": (10.0, 1e4)}, rate=512.0)
+    >>> setup.free["plant.machine.load_inertia"].start
+    150.0
     """
 
     model: Any
@@ -134,6 +136,9 @@ class ModelSetup(Result):
             raise InputError(f"Give the channels as ('{self.channels}',).")
         machine = self.measured
         name = self.name or machine.ports.name.lower()
+        for table in ("free", "fixed", "standard_uncertainty"):
+            by_path = {_full(key, machine): entry for key, entry in getattr(self, table).items()}
+            object.__setattr__(self, table, by_path)
         self._check_free_and_fixed(name)
         _check_numbers(f"{name}: the noise", self.noise, 0.0)
         _check_numbers(f"{name}: the fixed value", self.fixed, -inf)
@@ -393,6 +398,12 @@ def _check_numbers(table: str, numbers: Mapping[str, float], least: float) -> No
         if not is_real(number) or not least < number < inf:
             must = "finite" if least < 0.0 else "above 0"
             raise InputError(f"{table} of '{key}' is {number!r}, but must be {must}.")
+
+
+def _full(name: str, machine: MeasuredMachine) -> str:
+    """The path of a parameter whose last word is given, if it is the only such one."""
+    known = [*machine.ports.parameter_definitions, *map(zero_name, machine.signals)]
+    return name if name in known or machine.starts(name) else full_name(name, known)
 
 
 def _check_ranges(

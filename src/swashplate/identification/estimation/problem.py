@@ -21,7 +21,7 @@ from swashplate.identification.estimation.arrow import (
     triangular_factor,
     whitening,
 )
-from swashplate.identification.estimation.measured import measured
+from swashplate.identification.estimation.measured_machine import measured
 from swashplate.identification.estimation.model import (
     RELATIVE_STEP,
     EquationModel,

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from swashplate.campaign import Channel, Experiment
 from swashplate.errors import InputError
 from swashplate.identification.estimation.model import EquationModel, SimulationRequest
-from swashplate.machine import BlackBox, Machine
+from swashplate.machine import BlackBox, Machine, Ports
 from swashplate.machine import Model as Equations
 from swashplate.machine.fields import check_mapping, is_real, tuple_from
 from swashplate.machine.marching import (
@@ -26,7 +26,6 @@ from swashplate.machine.marching import (
     started_by,
 )
 from swashplate.machine.model import full_name, parameter_paths, state_paths
-from swashplate.machine.ports import Ports
 from swashplate.results import Result
 
 Array = NDArray[np.float64]
