@@ -12,6 +12,7 @@ from tests.identification.given import run_of
 from swashplate import (
     BlackBox,
     DomainError,
+    Drive,
     Experiment,
     InputError,
     Machine,
@@ -200,6 +201,18 @@ def test_a_joined_machine_is_fitted_by_last_words() -> None:
     expected = {"tank.gain": 2.0, "tank.lag": 0.3, "filter.time": 0.5}
     assert made.values == pytest.approx(expected, abs=0.03)
     assert made.parameters.numbers["tank.leak"] == 0.0
+
+
+def test_a_drive_is_a_machine_too() -> None:
+    """By paths, at half the rate that its equations bear: two steps a sample."""
+    drive = Drive.preset("hoist")
+    command = 9.0 * np.sin(2.0 * np.pi * 0.4 * np.arange(512) / 256.0)
+    speed = drive.simulate(command, 256.0, substeps=2).shaft_speed
+    time = np.arange(speed.size) / 256.0
+    run = run_of("sine", command, {"shaft_speed": speed}, time=time)
+    setup = ModelSetup(drive.scale(Z8=0.7), {"Z8": (1e5, 1e7)}, noise={"shaft_speed": 0.01})
+    made = fit(setup, [run])
+    assert made.values["pump.Z8"] == pytest.approx(drive["Z8"].value, rel=1e-6)
 
 
 def test_a_problem_takes_either_machine() -> None:

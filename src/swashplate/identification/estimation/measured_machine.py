@@ -6,13 +6,13 @@ from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from types import MappingProxyType
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeVar, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
 from swashplate.campaign import Channel, Experiment
-from swashplate.errors import InputError
+from swashplate.errors import DomainError, InputError, ParameterError, UnknownParameterError
 from swashplate.identification.estimation.model import EquationModel, SimulationRequest
 from swashplate.machine import BlackBox, Machine, Ports
 from swashplate.machine import Model as Equations
@@ -24,11 +24,13 @@ from swashplate.machine.marching import (
     even_rate,
     on_grid,
     started_by,
+    substeps_of,
 )
 from swashplate.machine.model import full_name, parameter_paths, state_paths
 from swashplate.results import Result
 
 Array = NDArray[np.float64]
+T = TypeVar("T", bound=Machine)
 NOTHING: Mapping[str, Any] = MappingProxyType({})
 
 
@@ -68,6 +70,11 @@ class MeasuredMachine(Result, ABC):
     def states_of(self, name: str) -> list[str]:
         """Paths of the states that such a name sets; none of a black box, whose number it is."""
         return [] if self.equations is None else states_started_by(self.equations, name)
+
+    @property
+    @abstractmethod
+    def name(self) -> str:
+        """Of the machine's numbers, or of the model without numbers."""
 
     @property
     def threads_help(self) -> bool:
@@ -150,6 +157,11 @@ class MeasuredEquations(MeasuredMachine, EquationModel):
     """The model's givens in all runs, or a mapping of them by the experiments' names."""
 
     @property
+    def name(self) -> str:
+        """See `MeasuredMachine`."""
+        return self.model.name if self.machine is None else self.machine.name
+
+    @property
     def threads_help(self) -> bool:
         """True: a march releases the lock."""
         return True
@@ -190,7 +202,8 @@ class MeasuredEquations(MeasuredMachine, EquationModel):
                 f"{experiment.name}: the stamps of its input are not even, so {self.ports.name} "
                 "needs a rate: rate = 100.0 in its file, or ModelSetup(..., rate=100.0)."
             )
-        record = self.record_of(experiment, driven, rate, self.substeps)
+        substeps = substeps_of(self.model, rate, self.substeps)
+        record = self.record_of(experiment, driven, rate, substeps)
         return driven, record, {name: each.at(record.points) for name, each in others.items()}
 
     def ready(
@@ -228,8 +241,7 @@ class MeasuredEquations(MeasuredMachine, EquationModel):
         """The model with these numbers, by path."""
         if self.machine is not None:
             machine = self.machine if given is None else self.machine.with_given(given)
-            numbers = self.numbers
-            return machine.replace({n: value for n, value in values.items() if value != numbers[n]})
+            return _replaced(machine, self.numbers, values)
         try:
             p = tuple_from(self.model.parameters, values)
         except KeyError as error:
@@ -247,6 +259,11 @@ class MeasuredBlackBox(MeasuredMachine):
     """
 
     machine: BlackBox
+
+    @property
+    def name(self) -> str:
+        """See `MeasuredMachine`."""
+        return self.machine.name
 
     @property
     def equations(self) -> None:
@@ -271,11 +288,22 @@ class MeasuredBlackBox(MeasuredMachine):
             record = self.record_of(experiment, driven, self.rate)
             time, command = record.points, record.values
         inputs = {driven: command, **{name: each.at(time) for name, each in others.items()}}
-        outputs = self.machine.replace(values).outputs(time, inputs)
+        outputs = _replaced(self.machine, self.numbers, values).outputs(time, inputs)
         return {
             name: np.interp(experiment[name].time, time, outputs[signal])
             for name, signal in self.signals_of(experiment).items()
         }
+
+
+def _replaced(machine: T, numbers: Mapping[str, float], values: Mapping[str, float]) -> T:
+    """A machine with other values; a `DomainError` if they break a rule of its numbers."""
+    changes = {name: value for name, value in values.items() if value != numbers.get(name)}
+    try:
+        return cast("T", machine.replace(changes))
+    except ParameterError as error:
+        if isinstance(error, UnknownParameterError):
+            raise
+        raise DomainError(str(error)) from None
 
 
 def measured(

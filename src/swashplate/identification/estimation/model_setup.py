@@ -86,10 +86,10 @@ class ModelSetup(Result):
     numbers, each is free or `fixed`.
 
     Of a name that is a path the last word is enough where it is unique. An entry of `free` is
-    (low, high), which begins at the machine's number, (low, nominal, high),
-    each with a unit behind it if you like, or an `Unknown`. A range of positive bounds, the upper
-    one at least ten times the lower one, is searched by its logarithm. ``"start.PATH"`` of a state
-    and ``"offset CHANNEL"``, the zero of a sensor, are free in each run by themselves.
+    (low, high), which begins at the machine's number, (low, nominal, high), each with a unit behind
+    it if you like, or an `Unknown`. A range of positive bounds, the upper one at least ten times
+    the lower one, is searched by its logarithm. ``"start.PATH"`` of a state and ``"offset
+    CHANNEL"``, the zero of a sensor, are free in each run by themselves.
 
     Examples
     --------
@@ -135,7 +135,7 @@ class ModelSetup(Result):
         if isinstance(self.channels, str):
             raise InputError(f"Give the channels as ('{self.channels}',).")
         machine = self.measured
-        name = self.name or machine.ports.name.lower()
+        name = self.name or machine.name.lower()
         for table in ("free", "fixed", "standard_uncertainty"):
             by_path = {_full(key, machine): entry for key, entry in getattr(self, table).items()}
             object.__setattr__(self, table, by_path)
