@@ -29,6 +29,7 @@ from swashplate.identification import (
     Unknowns,
     estimates_of,
     fit,
+    fixed_table,
     identify,
     predict,
     solve,
@@ -45,7 +46,7 @@ NOISE = {"level": 0.01}
 class Tank(NamedTuple):
     gain: Annotated[float, Definition("gain of the valve", "bar/V", above=0.0)]
     lag: Annotated[float, Definition("time constant", "s", above=0.0)]
-    leak: float = 0.0
+    leak: Annotated[float, Definition("what runs out", "bar")] = 0.0
 
 
 class State(NamedTuple):
@@ -143,8 +144,10 @@ def test_a_fit_begins_at_the_machines_numbers_and_holds_the_others() -> None:
     made = fit(replace(setup, noise=NOISE), tests)
     assert made.values == pytest.approx(TRUTH, abs=0.02)
     assert made.parameters.numbers["leak"] == 0.25
-    fixed = {name: each.status for name, each in made.estimates.items()}
-    assert fixed["leak"] == "fixed"
+    assert made.estimates["leak"].status == "fixed"
+    (row,) = fixed_table(made).rows
+    assert row.cells[:3] == ("leak", "what runs out", 0.25)
+    assert row.unit == "bar"
 
 
 def test_what_a_machine_holds_may_be_uncertain() -> None:

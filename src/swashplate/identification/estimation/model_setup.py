@@ -43,7 +43,7 @@ from swashplate.identification.estimation.setup import (
 )
 from swashplate.identification.estimation.solving import solve
 from swashplate.identification.estimation.unknowns import Unknown, Unknowns, zero_name
-from swashplate.machine.fields import check_mapping, is_real
+from swashplate.machine.fields import Definition, check_mapping, is_real
 from swashplate.machine.model import full_name
 from swashplate.machine.plausible import check_plausible
 from swashplate.results import Result
@@ -176,6 +176,13 @@ class ModelSetup(Result):
         free = {target for unknown in self.free.values() for target in unknown.targets}
         own = {name: value for name, value in self.measured.numbers.items() if name not in free}
         return own | dict(self.fixed)
+
+    def definition(self, name: str) -> Definition:
+        """What one of its numbers is; empty where the machine does not say it."""
+        definitions = self.measured.ports.parameter_definitions
+        last = name.rpartition(".")[2]
+        stated = definitions.get(name, Definition(last, ""))
+        return stated if stated.name != last else Definition("", "")
 
     def _check_free_and_fixed(self, name: str) -> None:
         """Refuse a setup without anything free, or with a name in two tables."""
