@@ -5,7 +5,6 @@ Beside the machine's equations it knows nothing: bounds and initial values are r
 
 from typing import NamedTuple
 
-from swashplate.identification import UserModel
 from swashplate.machine import Model, discretised, equation
 
 
@@ -39,9 +38,9 @@ def rates(state: State, voltage: float, p: Cylinder) -> State:
     return State((voltage - state.opening) / p.lag, state.speed, state.acceleration, jerk)
 
 
-cylinder = Model("cylinder", parameters=Cylinder, state=State, step=discretised(rates, "midpoint"))
-# at a rate of its own, since the stamps of a log are rounded and not even
-model = UserModel(cylinder, rate=512.0, substeps=2)
+model = Model("cylinder", parameters=Cylinder, state=State, step=discretised(rates, "midpoint"))
+rate = 512.0  # of its own, since the stamps of a log are rounded and not even
+substeps = 2
 free = {
     "lag": (0.01, 0.1, 1.0, "s"),
     "d_plus": (0.0, 0.5, 2.0, "V"),

@@ -17,10 +17,10 @@ import numpy as np
 
 from swashplate import Campaign, Experiment, Model, discretised, equation
 from swashplate.identification import (
+    ModelSetup,
     Problem,
     Unknown,
     Unknowns,
-    UserModel,
     sobol_starts,
     solve_from,
 )
@@ -67,12 +67,13 @@ def rates(state: State, u: float, p: Numbers) -> State:
 
 
 # the opening, straight between samples, is held over a quarter of one
-actuator = UserModel(Model("actuator", Numbers, State, discretised(rates, "midpoint")), rate=4.0)
+actuator = Model("actuator", Numbers, State, discretised(rates, "midpoint"))
+measured = ModelSetup(actuator, {each.name: each for each in UNKNOWNS}, rate=4.0).measured
 
 
 def fitted(training: Experiment) -> dict[str, float]:
     """Values of the unknowns: the best of several starts all over the bounds."""
-    problem = Problem(actuator, (training,), UNKNOWNS, ("p",), {"p": 1.0})
+    problem = Problem(measured, (training,), UNKNOWNS, ("p",), {"p": 1.0})
     starts = list(sobol_starts(problem, 8, seed=0))
     results = solve_from(problem, starts, tolerance=1e-8, max_evaluations=150)
     return UNKNOWNS.values(np.array(min(results, key=lambda each: each.cost).vector))
@@ -80,7 +81,7 @@ def fitted(training: Experiment) -> dict[str, float]:
 
 def error(values: dict[str, float], run: Experiment, on: slice | np.ndarray) -> float:
     """RMSE of a free run on some of its samples."""
-    wrong = actuator.simulate(values, run)["p"] - run["p"].values
+    wrong = measured.simulate(values, run)["p"] - run["p"].values
     return float(np.sqrt(np.mean(wrong[on] ** 2)))
 
 

@@ -18,10 +18,10 @@ from matplotlib.figure import Figure
 
 from swashplate import Campaign, Channel, Experiment, Model, Tap, equation
 from swashplate.identification import (
+    ModelSetup,
     Problem,
     Unknown,
     Unknowns,
-    UserModel,
     linearised_fit,
     solve,
     uncertainty,
@@ -84,13 +84,17 @@ def step(
     return State(state.log_a + rise_a, state.log_b + rise_b, state.position + h * speed)
 
 
-ACTUATOR = UserModel(Model("actuator", Actuator, State, step), begin={"position": "position"})
 ACTUATOR_UNKNOWNS = (
     Unknown("stroke", 7e-4, 1e-4, 5e-3, "m", log=True),
     Unknown("area_ratio", 1.5, 1.0, 3.0),
     Unknown("slip", 1.0, 0.0, 20.0, "1/(min bar)"),
     Unknown("air_a", 1.0, 0.0, 20.0),
     Unknown("air_b", 1.0, 0.0, 20.0),
+)
+ACTUATOR = ModelSetup(
+    Model("actuator", Actuator, State, step),
+    {unknown.name: unknown for unknown in ACTUATOR_UNKNOWNS},
+    begin={"position": "position"},
 )
 
 
@@ -122,10 +126,6 @@ def lag_step(state: Lagging, pump: float, p: Lag, h: float) -> Lagging:
     return Lagging(speed, state.position + h * speed)
 
 
-LAG = UserModel(
-    Model("lag", Lag, Lagging, lag_step, taps={"pump": Tap("pump", delay="delay")}),
-    begin={"position": "position"},
-)
 LAG_UNKNOWNS = (
     Unknown("dead_out", 50.0, 0.0, 500.0, "1/min"),
     Unknown("dead_back", 50.0, 0.0, 500.0, "1/min"),
@@ -133,6 +133,11 @@ LAG_UNKNOWNS = (
     Unknown("gain_back", 1e-3, 1e-4, 5e-3, "m", log=True),
     Unknown("lag", 0.05, 0.002, 1.0, "s", log=True),
     Unknown("delay", 0.02, 0.0, 0.3, "s"),
+)
+LAG = ModelSetup(
+    Model("lag", Lag, Lagging, lag_step, taps={"pump": Tap("pump", delay="delay")}),
+    {unknown.name: unknown for unknown in LAG_UNKNOWNS},
+    begin={"position": "position"},
 )
 
 
@@ -150,18 +155,20 @@ def since_anchor(channel: Channel, rows: np.ndarray) -> np.ndarray:
 
 
 # %% Fits to one load case, errors in the other
-MODELS: Mapping[str, tuple[UserModel, Sequence[Unknown], Values]] = {
-    "lag": (LAG, LAG_UNKNOWNS, {}),
-    "without slip": (ACTUATOR, ACTUATOR_UNKNOWNS, {"slip": 0.0}),
-    "without air": (ACTUATOR, ACTUATOR_UNKNOWNS, {"air_a": 0.0, "air_b": 0.0}),
-    FULL: (ACTUATOR, ACTUATOR_UNKNOWNS, {}),
+MODELS: Mapping[str, tuple[ModelSetup, Values]] = {
+    "lag": (LAG, {}),
+    "without slip": (ACTUATOR, {"slip": 0.0}),
+    "without air": (ACTUATOR, {"air_a": 0.0, "air_b": 0.0}),
+    FULL: (ACTUATOR, {}),
 }
 
 
-def error(model: UserModel, values: Values, run: Experiment) -> np.ndarray:
+def error(model: ModelSetup, values: Values, run: Experiment) -> np.ndarray:
     """(m,) simulated less measured motion. [m]"""
     position = run["position"]
-    return since_anchor(position, model.simulate(values, run)["position"] - position.values)
+    return since_anchor(
+        position, model.measured.simulate(values, run)["position"] - position.values
+    )
 
 
 def line_error(fitted: Experiment, run: Experiment) -> np.ndarray:
@@ -178,11 +185,11 @@ def line_error(fitted: Experiment, run: Experiment) -> np.ndarray:
     return columns(run) @ line - motion(run)
 
 
-def fit(model: UserModel, unknowns: Sequence[Unknown], fixed: Values, run: Experiment) -> Values:
+def fit(model: ModelSetup, fixed: Values, run: Experiment) -> Values:
     """Numbers of a model fitted to one load case; the actuator's are printed with intervals."""
-    free = Unknowns(tuple(unknown for unknown in unknowns if unknown.name not in fixed))
+    free = Unknowns(tuple(each for name, each in model.free.items() if name not in fixed))
     problem = Problem(
-        model,
+        model.measured,
         (run,),
         free,
         channels=("position",),
@@ -203,8 +210,8 @@ def fit(model: UserModel, unknowns: Sequence[Unknown], fixed: Values, run: Exper
 def errors(fitted: Experiment, run: Experiment) -> dict[str, np.ndarray]:
     """Errors (m,) in a load case by model, each fitted to the other one. [m]"""
     by_model = {"straight line": line_error(fitted, run)}
-    for name, (model, unknowns, fixed) in MODELS.items():
-        by_model[name] = error(model, fit(model, unknowns, fixed, fitted), run)
+    for name, (model, fixed) in MODELS.items():
+        by_model[name] = error(model, fit(model, fixed, fitted), run)
     return by_model
 
 

@@ -11,7 +11,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from math import exp
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -20,11 +20,11 @@ from scipy.stats import t as student
 from swashplate import Campaign, Channel, Drive, Experiment, Model, Tap, equation
 from swashplate.identification import (
     DriveModel,
+    ModelSetup,
     Prior,
     Problem,
     Unknown,
     Unknowns,
-    UserModel,
     solve,
 )
 
@@ -137,7 +137,7 @@ def with_others(tests: Campaign, run: Experiment) -> Experiment:
 class Candidate(NamedTuple):
     """A model with its unknowns; to its full speeds in both directions it is proportional."""
 
-    model: UserModel | DriveModel
+    model: Any  # what a problem simulates: `DriveModel`, or a setup's `measured`
     unknowns: Sequence[Unknown]
     speeds: tuple[str, str]
 
@@ -155,18 +155,18 @@ LAG = Candidate(
     ),
     ("G1_plus", "G1_minus"),
 )
+VALVE_UNKNOWNS = [
+    Unknown(name, mean, *bounds, log=name in LOGARITHMS, prior=Prior(mean, deviation))
+    for name, (mean, deviation, *bounds) in KNOWN.items()
+]
 VALVE = Candidate(
-    UserModel(valve, rate=RATE, begin={"position": "position"}),
-    [
-        Unknown(
-            name,
-            mean,
-            *bounds,
-            log=name in LOGARITHMS,
-            prior=Prior(mean, deviation),
-        )
-        for name, (mean, deviation, *bounds) in KNOWN.items()
-    ],
+    ModelSetup(
+        valve,
+        {unknown.name: unknown for unknown in VALVE_UNKNOWNS},
+        rate=RATE,
+        begin={"position": "position"},
+    ).measured,
+    VALVE_UNKNOWNS,
     ("speed_out", "speed_back"),
 )
 

@@ -68,6 +68,7 @@ BRANCHES = (
     ast.Assert,
 )
 KINDS = {
+    "BlackBox",
     "Drive",
     "DriveModel",
     "EquationModel",
@@ -77,7 +78,6 @@ KINDS = {
     "Machine",
     "Model",
     "ModelSetup",
-    "UserModel",
 }
 """Drives, models and setups of a fit: code that asks which of them it has treats them apart."""
 TRIPS = {

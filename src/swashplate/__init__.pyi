@@ -42,6 +42,7 @@ from .full_order import PhysicalSet as PhysicalSet
 from .identification import Identification as Identification
 from .identification import identify as identify
 from .machine import Batch as Batch
+from .machine import BlackBox as BlackBox
 from .machine import Definition as Definition
 from .machine import Machine as Machine
 from .machine import Model as Model

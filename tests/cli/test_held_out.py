@@ -17,7 +17,6 @@ from swashplate.identification.validation import RunQuality
 MODEL = """
 from typing import NamedTuple
 from swashplate.machine import Model, discretised, equation
-from swashplate.identification import UserModel
 
 class Motor(NamedTuple):
     gain: float
@@ -31,7 +30,8 @@ def rates(state: State, valve: float, p: Motor) -> State:
     return State((p.gain * valve - state.speed) / p.lag)
 
 step = discretised(rates, "midpoint")
-model = UserModel(Model("motor", parameters=Motor, state=State, step=step), substeps=4)
+model = Model("motor", parameters=Motor, state=State, step=step)
+substeps = 4
 free = {"gain": (0.1, 1.0, 10.0), "lag": (0.02, 0.1, 2.0)}
 noise = {"speed": 0.02}
 """

@@ -24,7 +24,6 @@ from typing import Annotated, NamedTuple
 
 from swashplate import Drive
 from swashplate.machine import Definition, Machine, Model, discretised, equation, join
-from swashplate.identification import UserModel
 
 
 class Filter(NamedTuple):
@@ -62,7 +61,7 @@ def limits(state: State, p: Filter) -> Limits:
 
 step = discretised(rates, "rk4")
 tank = Model("tank", Filter, State, step, limits=limits)
-model = UserModel(tank)
+model = tank
 free = {"lag": (0.01, 0.5, 1.0, "s"), "start.level": (-1.0, 0.25, 1.0)}
 fixed = {"gain": 2.0}
 """
@@ -387,7 +386,7 @@ def test_a_sentence_says_what_would_be_right(refused, own, typed):
         ("import sys\nsys.exit(3)\n", "sys.exit(3)"),
         ("machine = 3\n", "machine has the type int"),
         (FILE.replace('fixed = {"gain": 2.0}', ""), "states no value of gain"),
-        (FILE.replace("UserModel(tank)", "UserModel(tank, given={})"), "depends on the run"),
+        (FILE + "given = {}\n", "depends on the run"),
         (
             FILE.replace("model = ", "x = ").replace("free", "y") + FURTHER,
             "there are slow, settling, pair, winch: write own_broken.py:slow",

@@ -44,7 +44,7 @@ def free_run(actuator: ModuleType, opening: np.ndarray, rate: float = 1.0) -> np
         stiffness=0.084,
         drag=1.24,
     )
-    return simulate(Machine(actuator.actuator.model, numbers), {"u": opening}, rate)["p"]
+    return simulate(Machine(actuator.actuator, numbers), {"u": opening}, rate)["p"]
 
 
 def test_the_march_against_an_adaptive_solver(actuator: ModuleType) -> None:
@@ -83,7 +83,7 @@ def test_the_free_run_beats_what_is_published(
 ) -> None:
     tests = Campaign.from_toml(actuator.CAMPAIGN, logs=DATA)
     values = actuator.fitted(tests["train"])
-    simulated = actuator.actuator.simulate(values, tests["whole"])["p"]
+    simulated = actuator.measured.simulate(values, tests["whole"])["p"]
     ours = np.sqrt(np.mean((simulated[512:] - raw["p"][512:]) ** 2))
     linear = np.sqrt(np.mean((actuator.arx(raw["u"], raw["p"]) - raw["p"][512:]) ** 2))
     assert linear == pytest.approx(0.937, abs=1e-3)  # as is known of a linear ARX(10,10)

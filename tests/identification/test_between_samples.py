@@ -4,9 +4,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from tests.identification.given import model_of, run_of
+from tests.identification.given import run_of
 
-from swashplate import Drive
+from swashplate import BlackBox, Drive
 from swashplate.campaign import Experiment
 from swashplate.identification import as_fit_setup, fit
 from swashplate.identification.estimation import smooth
@@ -50,8 +50,14 @@ def test_a_model_of_its_own_code_is_not_tried_and_that_is_said() -> None:
     time = np.arange(40.0)
     run = run_of("run", time, {"y": 2.0 * time}, time=time, kind="other")
     run = replace(run, input=replace(run.input, settled=False))
-    model = model_of(lambda values, time, _: values["gain"] * time)
-    found = fit(model, [run], {"gain": (0.1, 1.0, 9.0)}, noise={"y": 0.1})
+    model = BlackBox(
+        "gain",
+        lambda time, inputs, numbers: {"y": numbers["gain"] * inputs["u"]},
+        inputs=("u",),
+        outputs=("y",),
+        numbers={"gain": 1.0},
+    )
+    found = fit(model, [run], {"gain": (0.1, 9.0)}, noise={"y": 0.1})
     assert {each.input.interpolation for each in found.runs} == {"linear"}
     assert any("[axes.hoist.input]" in said for said in found.doubts)
 

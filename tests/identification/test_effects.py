@@ -7,7 +7,7 @@ from math import sqrt
 import numpy as np
 import pytest
 from tests.identification.given import determined_of, run_of, virtual
-from tests.identification.test_own_model import FREE, OWN, TRUTH, trial, valve
+from tests.identification.test_own_model import FREE, TRUTH, Load, trial, valve
 
 from swashplate import Campaign, Drive, Experiment, ParameterError
 from swashplate.campaign import Accuracy, resolution_of_inputs
@@ -18,7 +18,11 @@ from swashplate.maneuvers import source_tests
 
 RATE = 512.0
 TIME = np.arange(2048) / RATE
-SETUP = ModelSetup(OWN, {unknown.name: unknown for unknown in FREE}, noise={"position": 0.01})
+SETUP = ModelSetup(
+    Machine(valve, TRUTH, given=Load()),
+    {unknown.name: unknown for unknown in FREE},
+    noise={"position": 0.01},
+)
 
 
 def logged(values: np.ndarray, **stated: float | None) -> Experiment:
@@ -199,9 +203,7 @@ def scaled_runs(random: np.random.Generator, count: int, deviation: float) -> li
         whole = trial(f"run {number}")
         gain = TRUTH.gain * (1.0 + deviation * random.standard_normal())
         inputs = {"command": whole.input.values}
-        position = simulate(
-            Machine(valve, TRUTH._replace(gain=gain), given=OWN.given), inputs, 20.0
-        )
+        position = simulate(Machine(valve, TRUTH._replace(gain=gain), given=Load()), inputs, 20.0)
         values = position["position"] + random.normal(0.0, 0.002, whole.input.values.size)
         channel = replace(whole["position"], values=values, accuracy=Accuracy())
         runs.append(replace(whole, channels={"position": channel}))

@@ -30,7 +30,6 @@ from swashplate.identification import (
     Search,
     Unknown,
     Unknowns,
-    UserModel,
     assess_fit,
     fit,
     identifiability_of,
@@ -38,9 +37,10 @@ from swashplate.identification import (
     solve,
     uncertainty_of,
 )
+from swashplate.identification.estimation.measured_machine import measured
 from swashplate.identification.estimation.model import linearised
 from swashplate.identification.estimation.problem import rounded_unknowns
-from swashplate.machine import Definition, Machine, Model, Tap, equation, simulate
+from swashplate.machine import BlackBox, Definition, Machine, Model, Tap, equation, simulate
 
 RATE = 20.0
 TIME = np.arange(240) / RATE
@@ -91,7 +91,7 @@ FREE = (
     Unknown("gain", 1.0, 0.1, 20.0, log=True),
     Unknown("delay", 0.05, 0.0, 0.5, "s"),
 )
-OWN = UserModel(valve, given=Load())
+OWN = measured(valve, given=Load())
 
 
 def trial(name: str, load: Load = Load(), begin: float = 0.0, **channels: np.ndarray) -> Experiment:  # noqa: B008
@@ -147,11 +147,11 @@ def test_a_run_has_a_load_a_beginning_and_a_zero_of_its_own() -> None:
         Unknown("offset position", 0.0, -2.0, 2.0, run="b", kind="zero", channel="position"),
     )
     runs = (first, moved(second, second["position"].values + 0.4))
-    values = found(problem(UserModel(valve, given=loads), *runs, free=free))
+    values = found(problem(measured(valve, given=loads), *runs, free=free))
     own = {"start.position (a)": 0.7, "offset position (b)": 0.4}
     assert values == pytest.approx({**TRUTH._asdict(), **own}, rel=1e-6)
     # or it begins where a channel does
-    model = UserModel(valve, given=loads, begin={"position": "position"})
+    model = measured(valve, given=loads, begin={"position": "position"})
     assert found(problem(model, first)) == pytest.approx(TRUTH._asdict(), rel=1e-7)
 
 
@@ -167,7 +167,7 @@ def test_uneven_stamps_are_put_on_a_grid(hold: str) -> None:
         "position"
     ]
     run = moved(run, np.interp(time, fine, level))
-    values = found(problem(UserModel(valve, given=Load(), rate=200.0), run))
+    values = found(problem(measured(valve, given=Load(), rate=200.0), run))
     assert values == pytest.approx(TRUTH._asdict(), rel=1e-3)
     with pytest.raises(InputError, match=r"a: .* input .* rate=100.0"):
         problem(OWN, run).cost(Unknowns(FREE).start)
@@ -187,11 +187,11 @@ def test_sub_steps_of_a_fit_are_those_of_a_simulation(hold) -> None:
     run = moved(trial("a"), made)
     run = replace(run, input=replace(run.input, interpolation=hold))
     expected = {"lag": TRUTH.lag, "gain": TRUTH.gain}
-    values = found(problem(UserModel(coarse, substeps=3), run, free=FREE[:2]))
+    values = found(problem(measured(coarse, substeps=3), run, free=FREE[:2]))
     assert values == pytest.approx(expected, rel=1e-7)
     assert found(problem(coarse, run, free=FREE[:2]))["lag"] != pytest.approx(TRUTH.lag, rel=0.01)
     with pytest.raises(InputError, match="substeps .* 0, .* whole number"):
-        problem(UserModel(coarse, substeps=0), run).cost(Unknowns(FREE).start)
+        problem(measured(coarse, substeps=0), run).cost(Unknowns(FREE).start)
 
 
 @equation
@@ -204,13 +204,13 @@ def test_a_channel_that_is_an_input_is_what_its_campaign_says_between_samples(ho
     model, slow = Model("pushed", Valve, Rod, pushed), slice(None, None, 5)
     load = np.cos(3.0 * TIME[slow])
     run = run_of("a", COMMAND, {"position": TIME, "load": load}, time=TIME, kind="other")
-    measured = replace(run["load"], time=TIME[slow], interpolation=hold)
-    run = replace(run, channels={**run.channels, "load": measured})
+    logged = replace(run["load"], time=TIME[slow], interpolation=hold)
+    run = replace(run, channels={**run.channels, "load": logged})
     held = np.repeat(load, 5)[: TIME.size]
     between = held if hold == "previous" else np.interp(TIME, TIME[slow], load)
     inputs = {"command": COMMAND, "load": between}
     expected = simulate(Machine(model, TRUTH), inputs, RATE)["position"]
-    made = UserModel(model).simulate(TRUTH._asdict(), run)["position"]
+    made = measured(model).simulate(TRUTH._asdict(), run)["position"]
     assert made == pytest.approx(expected, abs=1e-12)
 
 
@@ -248,8 +248,8 @@ REFUSED = {
     "value of gain": lambda: solve(problem(OWN, trial("a"), free=FREE[:1])),
     "gives no 'y'": lambda: solve(Problem(OWN, (trial("a", y=COMMAND),), *BOTH)),
     "signals command, supply; a ": lambda: solve(Problem(servo, (trial("a", place=TIME),), *PLACE)),
-    "given .* a Load": lambda: tried(UserModel(valve)),
-    "given .* for a": lambda: tried(UserModel(valve, given={"b": Load()})),
+    "given .* a Load": lambda: tried(measured(valve)),
+    "given .* for a": lambda: tried(measured(valve, given={"b": Load()})),
 }
 
 
@@ -348,26 +348,33 @@ def test_the_truth_is_found_judged_and_predicted() -> None:
     assert assess_fit(made, [quality]).headline.startswith("Usable")
 
 
-class Table:
+def tabled(time, inputs, numbers):
     """The servo as a program of others, with names that mean something to nobody else."""
+    place, rows = 0.0, []
+    for u, s in zip(inputs["command"], inputs["supply"], strict=True):
+        rows.append(place)
+        place += (numbers["offset slope"] * u * s - place) / (50.0 * numbers["lag"])
+    return {"place": np.array(rows)}
 
-    name = "table"
 
-    def simulate(self, values, experiment):
-        place, rows, supply = 0.0, [], experiment["supply"].values
-        for u, s in zip(experiment.input.values, supply, strict=True):
-            rows.append(place)
-            place += (values["offset slope"] * u * s - place) / (50.0 * values["start.lag"])
-        return {"place": np.array(rows)}
+TABLE = BlackBox(
+    "table",
+    tabled,
+    inputs=("command", "supply"),
+    outputs=("place",),
+    numbers={"offset slope": 1.0, "lag": 0.1},
+)
 
 
 def test_a_name_that_begins_like_a_sensors_zero_is_the_models() -> None:
-    free = {"offset slope": (0.1, 1.0, 10.0), "start.lag": (0.05, 0.1, 3.0)}
-    made = fit(Table(), [run("one", 1), run("two", 2)], free, noise=NOISE)
-    assert made.solution.converged
-    assert made.parameters.numbers == pytest.approx(
-        {"offset slope": GAIN, "start.lag": LAG}, abs=0.01
+    made = fit(
+        TABLE,
+        [run("one", 1), run("two", 2)],
+        {"offset slope": (0.1, 10.0), "lag": (0.05, 3.0)},
+        noise=NOISE,
     )
+    assert made.solution.converged
+    assert made.parameters.numbers == pytest.approx({"offset slope": GAIN, "lag": LAG}, abs=0.01)
     assert made.solution.cost == pytest.approx(COUNT, rel=0.1)  # noise of deviation 1
 
 
@@ -447,10 +454,10 @@ def test_a_fit_whose_other_starts_lie_out_of_the_domain() -> None:
 
 def test_starts_of_other_steps_are_not_resumed(tmp_path: Path) -> None:
     search = Search(1, store=tmp_path, resume=True)
-    made = fit(UserModel(servo), RUNS, RANGES, noise=NOISE, search=search)
+    made = fit(servo, RUNS, RANGES, noise=NOISE, search=search)
     assert len(made.starts) == 2
     with pytest.raises(FileError, match="nominal values"):
-        fit(UserModel(servo, substeps=2), RUNS, RANGES, noise=NOISE, search=search)
+        fit(ModelSetup(servo, RANGES, noise=NOISE, substeps=2), RUNS, search=search)
 
 
 def test_data_are_checked_before_the_search() -> None:
@@ -484,17 +491,16 @@ turning = Model("turning", parameters=Servo, state=Turning, step=turning_step)
 """A model of two signals, so that a fit goes on if a channel of one of them is called otherwise."""
 
 
-class Optional:
-    """The servo as a program that gives what it knows of a run's channels."""
+PROGRAM = BlackBox(
+    "program",
+    lambda time, inputs, numbers: dict.fromkeys(("place", "speed"), 0.0 * time),
+    inputs=("command", "supply"),
+    outputs=("place", "speed"),
+    numbers={"gain": 1.0, "lag": 0.3},
+)
 
-    def simulate(self, values, experiment):
-        outputs = {"place": values["gain"] * experiment["supply"].values}
-        if "speed" in experiment.channels:
-            outputs["speed"] = values["gain"] * experiment["supply"].values
-        return outputs
 
-
-@pytest.mark.parametrize("model", [turning, Optional()], ids=["equations", "program"])
+@pytest.mark.parametrize("model", [turning, PROGRAM], ids=["equations", "program"])
 @pytest.mark.parametrize(
     ("name", "named"),
     [("sped", r"did you mean speed\?"), ("n_motor", "without a channel: speed")],
@@ -519,33 +525,35 @@ def test_a_channel_is_left_out_if_that_is_said() -> None:
     assert list(stated.scales) == ["place"]
 
 
-class Late:
+def late(samples) -> BlackBox:
     """A gain behind a delay, as a program that turns the delay into samples in its own way."""
 
-    def __init__(self, samples) -> None:
-        self.samples = samples
+    def delayed(time, inputs, numbers):
+        behind = time - samples(numbers["delay"] * RATE) / RATE
+        level = numbers["gain"] * np.interp(behind, time, inputs["command"])
+        return {"position": np.clip(level, -numbers["limit"], numbers["limit"])}
 
-    def simulate(self, values, experiment):
-        time, command = experiment.input.time, experiment.input.values
-        samples = self.samples(values["delay"] * RATE)
-        late = np.interp(time - samples / RATE, time, command)
-        return {"position": np.clip(values["gain"] * late, -values["limit"], values["limit"])}
+    return BlackBox(
+        "late",
+        delayed,
+        inputs=("command",),
+        outputs=("position",),
+        numbers={"gain": 1.2, "delay": 0.2, "limit": 50.0},
+    )
 
 
 @pytest.mark.parametrize("samples", [int, round, np.ceil], ids=["int", "round", "ceil"])
 @pytest.mark.parametrize("nominal", [0.07, 0.1, 0.125])
 def test_a_delay_that_the_model_rounds_is_named_as_such(samples, nominal) -> None:
     """A tenth of a sample changes nothing, ten do: no search can move it, wherever it begins."""
-    model = Late(samples)
+    truth = late(samples)
     command = np.interp(TIME, np.arange(0.0, 12.0, 1.5), [0.0, 2.0, -1.0, 1.5, 0.5, -2.0, 1.0, 0.0])
     runs = [run_of("a", command, {"position": np.zeros(TIME.size)}, time=TIME, kind="other")]
-    truth = {"gain": 1.2, "delay": 0.2, "limit": 50.0}
-    channel = replace(
-        runs[0]["position"], values=model.simulate(truth, runs[0])["position"], noise=0.01
-    )
+    answer = simulate(truth, {"command": command}, RATE)["position"]
+    channel = replace(runs[0]["position"], values=answer, noise=0.01)
     runs[0] = replace(runs[0], channels={"position": channel})
     free = {"gain": (0.1, 1.0, 10.0), "delay": (0.0, nominal, 2.0, "s"), "limit": (1.0, 40.0, 80.0)}
-    sentences = identifiability_of(fit(model, runs, free)).sentences()
+    sentences = identifiability_of(fit(truth, runs, free)).sentences()
     assert any(
         re.match("The model rounds delay: a change by [0-9].* s .*np.interp", s) for s in sentences
     )
@@ -555,7 +563,7 @@ def test_a_delay_that_the_model_rounds_is_named_as_such(samples, nominal) -> Non
 
 def test_a_delay_that_the_model_follows_is_not_called_rounded() -> None:
     """Nor is a limit that no test reaches, whichever way its bounds lie."""
-    model = Late(float)
+    model = late(float)
     (each,) = [run_of("a", COMMAND, {"position": COMMAND}, time=TIME, kind="other")]
     each = replace(each, channels={"position": replace(each["position"], noise=0.01)})
     for limit in (3.0, 79.0):
@@ -582,7 +590,7 @@ SENSELESS = {
     "servo, fixed: lag .* 500 s, .* 0.001 to 100 s": lambda: ModelSetup(
         documented, {"gain": (0.1, 1.0, 10.0)}, fixed={"lag": 500.0}
     ),
-    "dict .* model": lambda: fit({}, RUNS, RANGES),
+    "dict .* machine": lambda: fit({}, RUNS, RANGES),
     "servo .* free": lambda: fit(servo, RUNS, {}),
     "lag .* 3: .* lower bound": lambda: fit(servo, RUNS, {"lag": 3}),
     "'lagg', .* free .* gain, lag": lambda: fit(
@@ -666,7 +674,8 @@ def test_a_run_with_a_scale_or_a_delay_of_its_own_is_named(gain, late, said) -> 
     read[2] = gain * np.interp(TIME - late, TIME, read[2])
     read += random.normal(0.0, 0.005, read.shape)
     runs = [moved(each, own) for each, own in zip(runs, read, strict=True)]
-    made = fit(OWN, campaign(*runs[:6]), {"lag": (0.05, 0.2, 2.0), "gain": (0.1, 1.0, 20.0)})
+    free = {"lag": (0.05, 0.2, 2.0), "gain": (0.1, 1.0, 20.0)}
+    made = fit(ModelSetup(valve, free, given=Load()), campaign(*runs[:6]))
     found = assess_fit(made, predict(made.parameters, runs[6:]))
     assert not found.usable
     assert [each.run for each in found.unsound] == ["run 2"]
@@ -713,13 +722,12 @@ def documented_valve(tmp_path: Path, monkeypatch) -> Path:
 
 @pytest.mark.slow
 def test_the_documented_model_file_finds_a_lag_in_several_processes(documented_valve: Path) -> None:
-    """Workers find the model, which has no name of its own, as an attribute of the `UserModel`."""
+    """Workers find the model by its name in the file."""
     setup = ModelSetup.from_file(documented_valve)
-    assert isinstance(setup.model, UserModel)
     assert pickle.loads(pickle.dumps(setup.model.model)) is setup.model.model
     runs = [valve_test("slow", 0.2), valve_test("fast", 0.6)]
     search = Search(2, executor=Processes(2))
-    made = fit(setup.model, runs, setup.free, noise={"rod": 1e-5}, search=search)
+    made = fit(replace(setup, noise={"rod": 1e-5}), runs, search=search)
     assert len(made.starts) == 3
     values = made.values
     assert {name: values[name] for name in MACHINE} == pytest.approx(MACHINE, rel=5e-3)

@@ -155,6 +155,7 @@ def _own_limits(
     plot: Path | None,
 ) -> None:
     """Show the limits that a model declares; with a command how long each acts."""
+    equations = own.model.name
     if maneuver is None:
         machine.refuse_without("a command", plot=plot)
         table = limits_table(own)
@@ -168,7 +169,7 @@ def _own_limits(
             draw_figure(plot, run.plot(title=title))
     if not table.rows:
         raise InputError(
-            f"{machine.title}: {own.model.name} declares no limits: give its Model limits=..., an "
+            f"{machine.title}: {equations} declares no limits: give its Model limits=..., an "
             "equation that returns a named tuple of bool, or its signals a range by a Definition."
         )
     save(out, "Limits", table.write)

@@ -19,8 +19,8 @@ if TYPE_CHECKING:
     from types import ModuleType
 
     from swashplate.drive import Drive, Simulation
-    from swashplate.identification import ModelSetup, UserModel
-    from swashplate.machine import Machine, Model, Run
+    from swashplate.identification import ModelSetup
+    from swashplate.machine import Machine, Model, Ports, Run
 
 MACHINE, MODEL = "machine", "model"
 """Names that stand for a file's machine if none is named, in this order."""
@@ -60,18 +60,23 @@ class OwnMachine:
 
     @property
     def model(self) -> Model:
-        """Its equations."""
+        """Its equations; a black box, which has none, is refused."""
         return self.machine.model
+
+    @property
+    def ports(self) -> Ports:
+        """What it takes, gives and is set by."""
+        return self.machine.ports
 
     @property
     def needed(self) -> tuple[str, ...]:
         """Inputs without which it cannot run, in their order."""
-        model = self.model
-        return tuple(name for name in model.external if name not in model.input_parameters)
+        ports = self.ports
+        return tuple(name for name in ports.external if name not in ports.input_parameters)
 
     def driven(self, given: Collection[str] = ()) -> str:
         """Its first input that is not given otherwise, which drives it if none is named."""
-        inputs = self.needed or self.model.external
+        inputs = self.needed or self.ports.external
         if not inputs:
             raise InputError(f"{self.title}: the equations of {self.machine.name} take no input.")
         return next((name for name in inputs if name not in given), inputs[0])
@@ -87,16 +92,16 @@ class OwnMachine:
 
     def input_named(self, name: str) -> str:
         """The full name of an input."""
-        return self.named(name, self.model.external, "input")
+        return self.named(name, self.ports.external, "input")
 
     def unit(self, signal: str) -> str:
         """Unit of an input or a signal; empty if the model states none."""
-        definition = self.model.definitions.get(signal)
+        definition = self.ports.definitions.get(signal)
         return definition.unit if definition else ""
 
     def meaning(self, signal: str) -> str:
         """What an input or a signal is, in words; empty if the model does not say it."""
-        definition = self.model.definitions.get(signal)
+        definition = self.ports.definitions.get(signal)
         return definition.name if definition else ""
 
     def constants(self, option: str, assignments: Sequence[str]) -> dict[str, float]:
@@ -128,29 +133,25 @@ class OwnMachine:
             check_rate(stated)
             return stated
         rate = self.rate or SOURCE_RATE
-        return rate * (substeps_of(self.model, rate, self.substeps) or 1)
+        return rate * (substeps_of(self.ports, rate, self.substeps) or 1)
 
     def table(self) -> Table:
         """Its parameters with their units."""
         columns = (Column("parameter"), Column("meaning", wrap=True), Column("", ".6g"), UNIT)
         table = Table("", columns, si=True)
-        numbers = numbers_of(self.machine)
         definitions = parameter_definitions(self)
-        for path, value in numbers.items():
+        for path, value in self.machine.numbers.items():
             definition = definitions[path]
             table.add(path, definition.name, value, unit=definition.unit)
         return without_empty(table)
 
     def signals_table(self) -> Table:
         """Its inputs, states and signals."""
-        from swashplate.machine.fields import floats_of
-
         table = Table("", (Column("signal"), Column("is"), Column("meaning", wrap=True), UNIT))
-        model = self.model
-        states = {part.full(path) for part in model.parts for path in floats_of(part.state)}
-        for name in dict.fromkeys((*model.external, *model.every_signal, *model.integrals)):
-            what = "state" if name in states else "signal"
-            if name in model.external:
+        ports = self.ports
+        for name in dict.fromkeys((*ports.external, *ports.every_signal, *ports.integrals)):
+            what = "state" if name in ports.state_signals else "signal"
+            if name in ports.external:
                 what = "input"
             table.add(name, what, self.meaning(name), unit=self.unit(name))
         return without_empty(table)
@@ -162,14 +163,14 @@ class OwnMachine:
 def machine_in(word: MachineWord) -> OwnMachine | Drive:
     """The machine, or the drive, that a word names."""
     from swashplate.drive import Drive
-    from swashplate.identification import UserModel
-    from swashplate.identification.estimation import loaded_module
+    from swashplate.identification import ModelSetup
+    from swashplate.identification.estimation import loaded_module, measured
     from swashplate.machine import Machine, Model
 
     # a script may print: that is no part of what the command says
     with redirect_stdout(sys.stderr):
         module = loaded_module(word.file)
-    name = word.name or (MODEL if word.fitted or not hasattr(module, MACHINE) else MACHINE)
+    name = word.name or (MACHINE if hasattr(module, MACHINE) else MODEL)
     if not hasattr(module, name):
         raise UnknownNameError(_lacks(word, module))
     found = getattr(module, name)
@@ -178,16 +179,25 @@ def machine_in(word: MachineWord) -> OwnMachine | Drive:
         title = f"{word.fitted} ({word.file})"
     if isinstance(found, Drive):
         return found
-    if isinstance(found, Machine):
-        return OwnMachine(found, title)
-    if isinstance(found, Model):
-        found = UserModel(found)
-    if not isinstance(found, UserModel):
+    if not isinstance(found, Machine | Model):
         raise InputError(
-            f"{word.file}: {name} has the type {type(found).__name__}, without equations to run: "
+            f"{word.file}: {name} has the type {type(found).__name__}, which is nothing to run: "
             "give a Machine, or a Model of equations."
         )
-    return _of_model(found, word, module, title)
+    setup = ModelSetup.from_file(word.file) if hasattr(module, "free") else None
+    if setup is not None and not (found is setup.model or found is setup.measured.equations):
+        setup = None
+    if word.fitted and setup is None:
+        raise InputError(f"{word.file} has no 'free', so that {word.fitted} is no fit of it.")
+    if isinstance(found, Machine):
+        own = _of_machine(found, word, setup, title)
+    else:
+        own = _of_model(found, word, setup, title)
+    if setup is None and name in (MACHINE, MODEL):
+        rate, substeps = (getattr(module, each, None) for each in ("rate", "substeps"))
+        measured(found, rate=rate, substeps=substeps)  # refuses what is none
+        own = replace(own, rate=rate, substeps=substeps)
+    return own
 
 
 def _lacks(word: MachineWord, module: ModuleType) -> str:
@@ -204,52 +214,73 @@ def _lacks(word: MachineWord, module: ModuleType) -> str:
     return f"{word.file} has no machine: it needs machine = Machine(model, ...)."
 
 
-def _of_model(found: UserModel, word: MachineWord, module: ModuleType, title: str) -> OwnMachine:
+def _of_machine(
+    found: Machine, word: MachineWord, setup: ModelSetup | None, title: str
+) -> OwnMachine:
+    """A machine as it stands in its file, or with the numbers of a fit to it."""
+    if setup is None:
+        return OwnMachine(found, title)
+    numbers = dict(setup.fixed)
+    if word.fitted:
+        of_machine = [name for name in found.numbers if not setup.measured.starts(name)]
+        numbers |= fitted_numbers(word, setup, of_machine)
+    changes = {name: value for name, value in numbers.items() if name in found.numbers}
+    return _as_fitted(found.replace(changes), setup, _nominal(setup) | numbers, title)
+
+
+def _of_model(found: Model, word: MachineWord, setup: ModelSetup | None, title: str) -> OwnMachine:
     """A model with the numbers of its file, or of a fit to it."""
-    from swashplate.identification import ModelSetup
-    from swashplate.identification.estimation import states_started_by
     from swashplate.machine import Machine
     from swashplate.machine.fields import defaults_of, tuple_from
     from swashplate.machine.model import parameter_paths
 
-    model = found.model
-    numbers, units = dict[str, float](), dict[str, str]()
-    setup = None
-    if hasattr(module, "free"):
-        setup = ModelSetup.from_file(word.file)
-        if getattr(setup.model, "model", None) is model:
-            numbers = dict(setup.fixed)
-            for unknown in setup.free.values():
-                numbers |= dict.fromkeys(unknown.targets, unknown.start)
-                units |= dict.fromkeys(unknown.targets, unknown.unit)
-    paths = parameter_paths(model)
-    if word.fitted:
-        if setup is None:
-            raise InputError(f"{word.file} has no 'free', so that {word.fitted} is no fit of it.")
+    numbers = {**setup.held, **_nominal(setup)} if setup is not None else {}
+    paths = parameter_paths(found)
+    if word.fitted and setup is not None:
         numbers |= fitted_numbers(word, setup, [name for name in numbers if name in paths])
-    begin = dict[str, float]()
-    for name, value in numbers.items():
-        begin |= dict.fromkeys(states_started_by(model, name), value)
     of_model = {name: value for name, value in numbers.items() if name in paths}
-    lacking = [name for name in paths if name not in {**defaults_of(model.parameters), **of_model}]
+    lacking = [name for name in paths if name not in {**defaults_of(found.parameters), **of_model}]
     if lacking:
         raise InputError(
             f"{word.file} states no value of {', '.join(lacking)}: name it in free or fixed, or "
-            f"write machine = Machine({model.name}, ...) there."
+            f"write machine = Machine({found.name}, ...) there."
         )
-    if isinstance(found.given, Mapping):
+    given = None if setup is None else setup.given
+    if isinstance(given, Mapping):
         raise InputError(
-            f"{word.file}: what is given of {model.name} depends on the run: write machine = "
+            f"{word.file}: what is given of {found.name} depends on the run: write machine = "
             "Machine(model, ..., given=...) there."
         )
-    p = tuple_from(model.parameters, of_model)
+    machine = Machine(found, tuple_from(found.parameters, of_model), given=given)
+    if setup is None:
+        return OwnMachine(machine, title)
+    return _as_fitted(machine, setup, numbers, title)
+
+
+def _nominal(setup: ModelSetup) -> dict[str, float]:
+    """Nominal values of what is free, by the machine's names."""
+    numbers = dict[str, float]()
+    for unknown in setup.free.values():
+        numbers |= dict.fromkeys(unknown.targets, unknown.start)
+    return numbers
+
+
+def _as_fitted(
+    machine: Machine, setup: ModelSetup, numbers: Mapping[str, float], title: str
+) -> OwnMachine:
+    """A machine, and what a setup says of how it is run; `numbers` say where a run begins."""
+    begin, units = dict[str, float](), dict[str, str]()
+    for name, value in numbers.items():
+        begin |= dict.fromkeys(setup.measured.states_of(name), value)
+    for unknown in setup.free.values():
+        units |= dict.fromkeys(unknown.targets, unknown.unit)
     return OwnMachine(
-        machine=Machine(model, p, options=found.options, given=found.given),
+        machine=machine,
         title=title,
         begin=begin,
         units=units,
-        rate=found.rate,
-        substeps=found.substeps,
+        rate=setup.rate,
+        substeps=setup.substeps,
     )
 
 
@@ -272,17 +303,10 @@ def fitted_setup(model: Path, fitted: str | None) -> ModelSetup:
 # --- changes --------------------------------------------------------------------------------------
 
 
-def numbers_of(machine: Machine) -> dict[str, float]:
-    """Parameters of a machine by path."""
-    from swashplate.machine.model import parameter_paths
-
-    return dict(zip(parameter_paths(machine.model), machine.params.tolist(), strict=True))
-
-
 def parameter_definitions(own: OwnMachine) -> dict[str, NumberDefinition]:
     """Meaning and unit of each parameter, by path."""
     definitions = dict[str, NumberDefinition]()
-    for path, definition in own.model.parameter_definitions.items():
+    for path, definition in own.ports.parameter_definitions.items():
         is_stated = definition.name != path.rpartition(".")[2]
         definitions[path] = NumberDefinition(definition.name if is_stated else "", definition.unit)
     for path, unit in own.units.items():
@@ -298,8 +322,7 @@ def changed(own: OwnMachine, values: Sequence[str] = (), factors: Sequence[str] 
 
     if not values and not factors:
         return own
-    model = own.model
-    numbers = numbers_of(own.machine)
+    numbers = dict(own.machine.numbers)
     parameters = parameter_definitions(own)
     starts = dict(_starts(own))
     names = [*parameters, *starts]
@@ -326,7 +349,7 @@ def changed(own: OwnMachine, values: Sequence[str] = (), factors: Sequence[str] 
         if isnan(value):
             raise InputError(f"--set {name}=nan is no number; write it as {EXAMPLE}.")
         if name in starts:
-            paths = states_started_by(model, name)
+            paths = states_started_by(own.model, name)
             begin |= dict.fromkeys(paths, value)
             stated |= set(paths)
             lines.append(f"{name}: {value:g} {unit_text(starts[name].unit)}".rstrip())
@@ -336,7 +359,7 @@ def changed(own: OwnMachine, values: Sequence[str] = (), factors: Sequence[str] 
         if name in starts:
             raise InputError(f"--scale {name}: the start of a state is set, by --set {name}=VALUE.")
         numbers[name] *= factor
-    before = numbers_of(own.machine)
+    before = own.machine.numbers
     changes = {name: number for name, number in numbers.items() if number != before[name]}
     for name, number in changes.items():
         unit = unit_text(parameters[name].unit)
@@ -352,16 +375,9 @@ def changed(own: OwnMachine, values: Sequence[str] = (), factors: Sequence[str] 
 
 def _starts(own: OwnMachine) -> Iterator[tuple[str, NumberDefinition]]:
     """What can be set of the state at the first sample, by name."""
-    from swashplate.machine.fields import floats_of
-
-    for index, part in enumerate(own.model.parts):
-        prefix = own.model.prefix(index)
-        for path in (*floats_of(part.state), *part.free_start):
-            signal = part.full(path)
-            yield (
-                f"start.{prefix}{path}",
-                NumberDefinition(own.meaning(signal) or path, own.unit(signal)),
-            )
+    for name, signal in own.ports.starts.items():
+        words = own.meaning(signal) or signal.rpartition(".")[2]
+        yield name, NumberDefinition(words, own.unit(signal))
 
 
 # --- runs -----------------------------------------------------------------------------------------
@@ -381,7 +397,7 @@ def run_tables(own: OwnMachine | None, run: Run) -> list[Table]:
         UNIT,
     )
     signals = Table("", columns)
-    outputs = own.model.outputs
+    outputs = own.ports.outputs
     for name in dict.fromkeys((*run.records, *outputs) if outputs else run.names[1:]):
         values = run[name]
         ends = [float(values.min()), float(values.max()), float(values[-1])]
@@ -407,12 +423,12 @@ def limits_table(own: OwnMachine, run: Run | None = None) -> Table:
     """Limits that the model declares and ranges of its signals; with a run the time of each."""
     of_run = (Column("share of time", ".1%"),) if run is not None else ()
     table = Table("", (Column("limit"), Column("meaning", wrap=True), *of_run))
-    for name, meaning in own.model.limit_meanings.items():
+    for name, meaning in own.ports.limit_meanings.items():
         share = [share_cell(float(run.active(name).mean()))] if run is not None else []
         table.add(name, meaning, *share)
-    for name, definition in own.model.definitions.items():
+    for name, definition in own.ports.definitions.items():
         # an input beyond its range is refused, so that none is ever there
-        if definition.range == "any finite number" or name in own.model.external:
+        if definition.range == "any finite number" or name in own.ports.external:
             continue
         share = []
         if run is not None:

@@ -271,7 +271,7 @@ def own_run(own: OwnMachine, command: str, options: Simulating) -> tuple[str, Ru
         if not series:
             raise InputError(
                 f"{command} has no column of an input of {own.machine.name}: call one "
-                f"{' or '.join(own.model.external)}, or write --measured {own.driven()}=COLUMN."
+                f"{' or '.join(own.ports.external)}, or write --measured {own.driven()}=COLUMN."
             )
         _check_interpolation(command, options)
         time = next(iter(series.values())).time
@@ -322,12 +322,12 @@ def command_name(own: OwnMachine, command: str, inputs: Mapping[str, Any]) -> st
 def _columns_of_inputs(own: OwnMachine, log: Log, options: CommandSampling) -> dict[str, str]:
     """Column of a log for each input that has one, by its name or the last word of it."""
     columns = dict[str, str]()
-    for name in own.model.external:
+    for name in own.ports.external:
         requested = name
         if options.stated_column is not None and name == own.driven():
             requested = options.stated_column
         last = requested.rpartition(".")[2]
-        is_only = [each.rpartition(".")[2] for each in own.model.external].count(last) == 1
+        is_only = [each.rpartition(".")[2] for each in own.ports.external].count(last) == 1
         for column in (requested, last) if is_only else (requested,):
             if name not in columns and _has(log, column):
                 columns[name] = column

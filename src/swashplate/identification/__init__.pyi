@@ -16,8 +16,6 @@ from .estimation.fit_problem import as_fit_setup as as_fit_setup
 from .estimation.fit_problem import smooth as smooth
 from .estimation.fit_problem import whole_drive as whole_drive
 from .estimation.model import Linearised as Linearised
-from .estimation.model import MachineModel as MachineModel
-from .estimation.model import UserModel as UserModel
 from .estimation.model_setup import ModelSetup as ModelSetup
 from .estimation.posterior import Posterior as Posterior
 from .estimation.problem import Problem as Problem

@@ -40,7 +40,7 @@ from swashplate.identification.estimation.fit_problem import (
     smooth,
     with_estimates,
 )
-from swashplate.identification.estimation.model import EquationModel, MachineModel, UserModel
+from swashplate.identification.estimation.model import EquationModel
 from swashplate.identification.estimation.model_setup import ModelSetup
 from swashplate.identification.estimation.problem import Loss, Problem
 from swashplate.identification.estimation.setup import FitSetup, FreeParameters
@@ -62,6 +62,7 @@ from swashplate.identification.lateness import (
 from swashplate.identification.optimum import Optimum
 from swashplate.identification.statistics.intervals import Estimate, weighed
 from swashplate.identification.unseen import is_guessed, with_unseen
+from swashplate.machine import Machine
 from swashplate.machine import Model as Equations
 from swashplate.parameters import SIDES, ParameterSet
 from swashplate.progress import LOGGER, working
@@ -217,7 +218,7 @@ class Fit(Optimum, Estimated):
 
 
 def fit(
-    model: Drive | Parameters | MachineModel | Equations,
+    model: Drive | Parameters | Machine | Equations,
     tests: Campaign | Sequence[Experiment],
     free: FreeParameters | None = None,
     *,
@@ -238,11 +239,11 @@ def fit(
 
     Parameters
     ----------
-    model : Drive, ParameterSet, MachineModel or ModelSetup
+    model : Drive, ParameterSet, Machine, Model or ModelSetup
         A drive: where to begin, and what stays fixed. The decay's switch is split, see `smooth`,
         the card's filter is its differential equation unless the fit setup's `card_filter`
-        says "recursion". Or a user-defined model: of equations,
-        a `UserModel` of them, any object with `simulate`, or a `ModelSetup`.
+        says "recursion". Or a machine of your own: one of equations or a
+        `BlackBox`, a `Model` without numbers, or a `ModelSetup` of either, which says more.
     tests : Campaign or sequence of Experiment
         The runs to fit; of a campaign those with the role ``"fit"``.
     free : FitSetup, str, path or mapping
@@ -634,13 +635,13 @@ def _explained(problem: Problem, solution: Solution) -> bool:
 
 def _origin(setup: FitSetup, problem: Problem, limits: Mapping[str, float]) -> dict[str, str]:
     """Fingerprints of all that the result of a start depends on."""
-    model = repr(problem.model) if isinstance(problem.model, UserModel) else ""
-    fixed = sorted(problem.fixed.items()), sorted(problem.zeros.items())
-    nominal: object = (model, problem.start.tolist(), fixed)
     if isinstance(problem.model, DriveModel):
         drive = problem.model.parameters
         forms = drive.pressure_root, drive.coulomb_sign, drive.rate, sorted(drive.options)
-        nominal = sorted(drive.numbers.items()), forms
+        nominal: object = (sorted(drive.numbers.items()), forms)
+    else:
+        fixed = sorted(problem.fixed.items()), sorted(problem.zeros.items())
+        nominal = (getattr(problem.model, "origin", ""), problem.start.tolist(), fixed)
     marks = {
         "fit setup": setup.model_dump_json(),
         "tolerances": sorted(limits.items()),

@@ -19,12 +19,12 @@ from swashplate.identification.diagnostics.data_checks import refuse_unsound, sp
 from swashplate.identification.diagnostics.verdict import REQUIRED
 from swashplate.identification.estimation.between_samples import doubt
 from swashplate.identification.estimation.fit_problem import Parameters, setup_of
-from swashplate.identification.estimation.model import MachineModel
 from swashplate.identification.estimation.model_setup import ModelSetup
 from swashplate.identification.estimation.problem import Loss
 from swashplate.identification.estimation.setup import FitSetup, FreeParameters
 from swashplate.identification.fitting import Fit, Search, fit
 from swashplate.identification.statistics.profiles import profiles_of
+from swashplate.machine import Machine
 from swashplate.machine import Model as Equations
 from swashplate.machine.fields import is_real
 from swashplate.parameters import ParameterSet, named_set
@@ -34,7 +34,7 @@ MOST_EVALUATIONS = 600
 
 def identify(
     tests: str | Path | Campaign,
-    model: str | Path | Drive | ParameterSet | ModelSetup | MachineModel | Equations | None = None,
+    model: str | Path | Drive | ParameterSet | ModelSetup | Machine | Equations | None = None,
     free: FreeParameters | None = None,
     *,
     axis: str | None = None,
@@ -60,8 +60,8 @@ def identify(
     model : Drive, ParameterSet, str or path, or user-defined model, optional
         The drive to begin at: by default the one that the campaign names; a packaged one by its
         name, a parameter file, or the folder of a fit. Or what is fitted instead of a drive: a
-        model of equations or any object with `simulate`, with `free`; a `ModelSetup`; a Python file
-        that states one.
+        `Machine`, of equations or a `BlackBox`, or a `Model`, with `free`; a `ModelSetup`; a Python
+        file that states one.
     free : FitSetup, str, path or mapping, optional
         What to estimate. By default every number of the drive, known beforehand to within 30 %.
         Or a TOML file, a `FitSetup`, or a mapping of the drive's parameters to factors on their
@@ -225,10 +225,10 @@ def _stated(
         drive = model.parameters
     if isinstance(drive, ParameterSet):
         return drive, setup_of(campaign, axis, drive, free)
-    if not isinstance(drive, Equations) and not callable(getattr(drive, "simulate", None)):
+    if not isinstance(drive, Machine | Equations):
         raise InputTypeError(
             f"The model is {drive!r}: give a Drive, the name of a packaged one such as 'hoist', a "
-            "parameter file, the folder of a fit, or a user-defined model."
+            "parameter file, the folder of a fit, or a Machine or Model of your own."
         )
     if not isinstance(free, Mapping):
         raise InputError(

@@ -168,7 +168,10 @@ def estimates_by_name(fit: Optimum) -> dict[str, Estimate]:
             by_name.update(dict.fromkeys(unknown.targets, estimate))
     parameters, estimated = fit.parameters, _estimated_columns(fit)
     for name, value in parameters.numbers.items():
-        unit = "" if isinstance(parameters, ModelSetup) else parameters[name].unit
+        if isinstance(parameters, ModelSetup):
+            unit = parameters.definition(name).unit
+        else:
+            unit = parameters[name].unit
         status: Status = "from the forces" if name in estimated else "fixed"
         by_name.setdefault(name, Estimate(name, value, unit, source=Interval(status)))
     return by_name
@@ -251,7 +254,9 @@ def fixed_table(fit: Optimum, truth: ParameterSet | None = None) -> Table:
     if isinstance(parameters, ModelSetup):
         for name, value in parameters.numbers.items():
             if name not in estimated:
-                table.add(name, "", value, None, "given with the model", "")
+                definition = parameters.definition(name)
+                reason = "given with the machine"
+                table.add(name, definition.name, value, None, reason, "", unit=definition.unit)
         return table
     for column, symbol in COLUMNS.items():
         if column in estimated:

@@ -30,6 +30,7 @@ from .kernels import kernel as kernel
 from .linear.frequency_response import sweep as sweep
 from .linear.linearisation import linearize as linearize
 from .linear.settling import settle as settle
+from .marching.black_box import BlackBox as BlackBox
 from .marching.run import Machine as Machine
 from .marching.sensitivity import Sensitivities as Sensitivities
 from .marching.sensitivity import sensitivities as sensitivities
@@ -44,5 +45,6 @@ from .model import SignalSource as SignalSource
 from .model import Tap as Tap
 from .model import Window as Window
 from .model import discretised as discretised
+from .ports import Ports as Ports
 from .replacement import Replacement as Replacement
 from .replacement import replaced as replaced

@@ -236,8 +236,8 @@ class Model:
     def __reduce__(self) -> tuple[Any, ...]:
         """By its recipe, or its name in a module, from which another process imports it.
 
-        The name is the model's own, or that of an object with the model in an attribute, as an
-        `UserModel` has.
+        The name is the model's own, or that of an object with the model in an attribute, as a
+        `Machine` has.
         """
         if self.recipe:
             return self.recipe
@@ -361,6 +361,20 @@ class Model:
         """Part and path of every number of its parameters, given or state, in flat order."""
         kinds = [getattr(part, kind) for part in self.parts]
         return tuple((i, path) for i, kind in enumerate(kinds) if kind for path in floats_of(kind))
+
+    @cached_property
+    def state_signals(self) -> tuple[str, ...]:
+        """Signals that are numbers of the state."""
+        return tuple(self.parts[index].full(path) for index, path in self.places("state"))
+
+    @cached_property
+    def starts(self) -> dict[str, str]:
+        """Signal that each number of the state at the first sample is of, by ``start.PATH``."""
+        return {
+            f"start.{self.prefix(index)}{path}": part.full(path)
+            for index, part in enumerate(self.parts)
+            for path in (*floats_of(part.state), *part.free_start)
+        }
 
     @cached_property
     def ranges(self) -> dict[str, Definition]:
@@ -713,7 +727,7 @@ def discretised(
         Explicit Runge-Kutta method, of order 1, 2, 2 and 4.
     substeps : int
         Steps of the method from one sample to the next, of equal length. They are written out, so
-        that many take long to compile; those of `simulate` and `UserModel` do not.
+        that many take long to compile; those of `simulate` and of a fit do not.
     project : equation, optional
         Of the same arguments: the state within its bounds, such as end stops, done to the state at
         the end of each sub-step.

@@ -7,7 +7,8 @@ from .fit_problem import Parameters as Parameters
 from .fit_problem import problem_of as problem_of
 from .fit_problem import setup_of as setup_of
 from .fit_problem import smooth as smooth
-from .model import states_started_by as states_started_by
+from .measured_machine import measured as measured
+from .measured_machine import states_started_by as states_started_by
 from .model_setup import loaded_module as loaded_module
 from .setup import Forces as Forces
 from .setup import Free as Free

@@ -4,30 +4,17 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass
 from types import MappingProxyType
-from typing import Any, NamedTuple, Protocol, TypeVar
+from typing import NamedTuple, Protocol, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from swashplate.campaign import CommandJump, Experiment
 from swashplate.errors import DomainError, InputError, meant
-from swashplate.machine import Machine
-from swashplate.machine import Model as Equations
-from swashplate.machine.fields import tuple_from
-from swashplate.machine.marching import (
-    BoundModel,
-    Observation,
-    ObservedRecord,
-    Record,
-    RunValues,
-    even_rate,
-    on_grid,
-    started_by,
-)
-from swashplate.machine.model import parameter_paths, state_paths
-from swashplate.results import Result, short
+from swashplate.machine.marching import BoundModel, Observation, ObservedRecord, Record
+from swashplate.results import short
 
 Array = NDArray[np.float64]
 INSTANT_STEP = 1e-5
@@ -35,19 +22,10 @@ INSTANT_STEP = 1e-5
 
 
 class MachineModel(Protocol):
-    """A model of the machine; with only `simulate` it is differentiated by central differences.
+    """What a problem simulates; with only `simulate` it is differentiated by central differences.
 
     One that knows its derivatives has ``linearise(values, experiment, names)`` as well, which gives
-    for each channel a `Linearised`.
-
-    Examples
-    --------
-    >>> import numpy as np
-    >>> class Gain:
-    ...     def simulate(self, values, experiment):
-    ...         command, speed = experiment.input, experiment["speed"]
-    ...         volts = np.interp(speed.time, command.time, command.values)
-    ...         return {"speed": values["gain"] * volts}
+    for each channel a `Linearised`. A machine is made one by `measured`, a drive by `DriveModel`.
     """
 
     def simulate(self, values: Mapping[str, float], experiment: Experiment) -> Mapping[str, Array]:
@@ -196,7 +174,7 @@ class SimulationRequest(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class EquationModel(ABC):
-    """What every model of equations has in common; see `UserModel` and `DriveModel`."""
+    """What every model of equations has in common; see `MeasuredEquations` and `DriveModel`."""
 
     @abstractmethod
     def signals_of(self, experiment: Experiment) -> Mapping[str, str]:
@@ -289,132 +267,3 @@ class EquationModel(ABC):
                 for channel, output in outputs.items():
                     output.by[:, column] = (later[channel] - output.values) / INSTANT_STEP
         return outputs
-
-
-def states_started_by(model: Equations, name: str) -> list[str]:
-    """Paths of the states that a name such as ``"start.PATH"`` sets; none if it is none such."""
-    return [
-        f"{model.prefix(part)}{state}"
-        for part in range(len(model.parts))
-        for state in started_by(model, part, name)
-    ]
-
-
-@dataclass(frozen=True, eq=False)
-class UserModel(Result, EquationModel):
-    """A model of equations whose parameters, by their paths, are the unknowns.
-
-    ``"start.PATH"`` is a number of the state at the first sample, by its path or as `free_start` of
-    the model has it: an unknown of each run.
-
-    A channel is compared with the signal of its name. Of the model's external signals those that
-    are channels of an experiment are taken from there; the one that is left is its input.
-
-    Examples
-    --------
-    >>> from swashplate.identification import UserModel
-    >>> from swashplate.models.full_order import plant
-    >>> UserModel(plant, rate=512.0).signals[:2]
-    ['solenoid_force', 'spool_position']
-    """
-
-    model: Equations
-    rate: float | None = None
-    """Samples a second; by default the input's. Needed if its stamps are not even. [Hz]"""
-    options: Any = None
-    given: Any = None
-    """The model's givens, or a mapping of them by the experiments' names."""
-    begin: Mapping[str, str] = field(default_factory=dict)
-    """Channel that says where a number of the state begins, by its path: at the first sample that
-    counts."""
-    substeps: int | None = None
-    """Steps of the model a sample; by default one."""
-
-    @property
-    def signals(self) -> list[str]:
-        """Names of the signals that it gives."""
-        names = [name for part in self.model.parts for name in part.signal_names]
-        return [*names, *self.model.links, *self.model.integrals]
-
-    def signals_of(self, experiment: Experiment) -> Mapping[str, str]:
-        """Signal of the model for each channel that it gives; one of none is refused."""
-        signals = self.signals
-        signal_of = {name: name for name in experiment.channels if name in signals}
-        if not signal_of:
-            raise InputError(
-                f"{experiment.name} has the channels {', '.join(experiment.channels)}, of which "
-                f"{self.model.name} gives none; it gives {', '.join(signals)}."
-            )
-        return signal_of
-
-    def driven(
-        self, experiment: Experiment, values: Mapping[str, float] = MappingProxyType({})
-    ) -> tuple[str, Record, Mapping[str, Array]]:
-        """The experiment's input on the grid, and external signals that are channels.
-
-        Refused if stamps are uneven and no rate is given, or if it is not clear which signal the
-        input is.
-        """
-        model = self.model
-        command = experiment.input
-        defaults = {p.tap(name).signal for p in model.parts for name in p.defaults}
-        others = [experiment[name] for name in model.external if name in experiment.channels]
-        inputs = [name for name in model.external if name not in experiment.channels]
-        inputs = [name for name in inputs if name not in defaults] or inputs
-        if len(inputs) != 1:
-            raise InputError(
-                f"{model.name} needs the signals {', '.join(model.external)}; {experiment.name} "
-                "has one input, for one of them, and the channels "
-                f"{', '.join(experiment.channels)}."
-            )
-        even = even_rate(command.time)
-        rate = self.rate or even
-        if rate is None:
-            raise InputError(
-                f"{experiment.name}: the stamps of its input are not even, so the model needs a "
-                f"rate, as in UserModel({model.name}, rate=100.0)."
-            )
-        record = on_grid(
-            {inputs[0]: command.values},
-            rate,
-            time=None if rate == even else command.time,
-            interpolation="previous" if command.is_held else "linear",
-            substeps=self.substeps,
-        )[inputs[0]]
-        record = replace(record, start=float(command.time[0]))
-        return inputs[0], record, {signal.name: signal.at(record.points) for signal in others}
-
-    def ready(
-        self, values: Mapping[str, float], experiment: Experiment, request: SimulationRequest
-    ) -> BoundModel:
-        """The model with numbers; a name that is not known, or no value of one, is refused."""
-        model, given = self.model, self.given
-        paths, states, begin = parameter_paths(model), state_paths(model), dict[str, float]()
-        for path, channel in self.begin.items():
-            measured = experiment[channel]
-            begin[path] = float(measured.values[int(np.argmax(measured.used))])
-        for name, value in values.items():
-            started = states_started_by(model, name)
-            begin |= dict.fromkeys(started, value)
-            if name not in paths and not started:
-                parameters = ", ".join(paths)
-                raise InputError(f"{model.name} has no parameter '{name}'; it has {parameters}.")
-        for path in begin:
-            if path not in states:
-                raise InputError(
-                    f"{model.name} has no state '{path}' to begin at; it has {', '.join(states)}."
-                )
-        try:
-            p = tuple_from(
-                model.parameters, {name: values[name] for name in values if name in paths}
-            )
-        except KeyError as error:
-            raise InputError(
-                f"{model.name} has no value of {error.args[0]}: let it be free, or fix it."
-            ) from None
-        if isinstance(given, Mapping):
-            if experiment.name not in given:
-                raise InputError(f"{model.name} has no given numbers for {experiment.name}.")
-            given = given[experiment.name]
-        instance = Machine(model, p, options=self.options, given=given)
-        return BoundModel(instance, RunValues(begin, request.offsets), request.columns)

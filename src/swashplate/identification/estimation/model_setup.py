@@ -1,10 +1,11 @@
-"""A user-defined model as it is fitted: what is to be found of it, and its numbers."""
+"""A machine as it is fitted: what is to be found of it, and its numbers."""
 
 from __future__ import annotations
 
 import sys
-from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from importlib import import_module
 from math import inf
 from pathlib import Path
@@ -15,7 +16,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from swashplate.campaign import Channel, Experiment
+from swashplate.campaign import Experiment
 from swashplate.documents import validated
 from swashplate.errors import (
     FileError,
@@ -26,7 +27,13 @@ from swashplate.errors import (
     UnknownNameError,
     meant,
 )
-from swashplate.identification.estimation.model import UserModel, simulated, states_started_by
+from swashplate.identification.estimation.measured_machine import (
+    MeasuredBlackBox,
+    MeasuredEquations,
+    MeasuredMachine,
+    measured,
+)
+from swashplate.identification.estimation.model import simulated
 from swashplate.identification.estimation.problem import Problem, noise_scales
 from swashplate.identification.estimation.setup import (
     FitSetup,
@@ -36,48 +43,89 @@ from swashplate.identification.estimation.setup import (
 )
 from swashplate.identification.estimation.solving import solve
 from swashplate.identification.estimation.unknowns import Unknown, Unknowns, zero_name
-from swashplate.machine import Model as Equations
-from swashplate.machine.fields import check_mapping, is_real
-from swashplate.machine.model import parameter_paths
+from swashplate.machine.fields import Definition, check_mapping, is_real
+from swashplate.machine.model import full_name
 from swashplate.machine.plausible import check_plausible
 from swashplate.results import Result
 from swashplate.tables import listed
 
 Array = NDArray[np.float64]
-Range = tuple[float, float, float] | tuple[float, float, float, str]
-"""Lower bound, nominal value, upper bound, and the unit if it is said."""
+Range = (
+    tuple[float, float]
+    | tuple[float, float, str]
+    | tuple[float, float, float]
+    | tuple[float, float, float, str]
+)
+"""Lower bound, nominal value unless it is the machine's number, upper bound, and the unit if it is
+said."""
+IN_FILE = ("machine", "model")
+"""Names of a file's machine, the first before the second."""
+BESIDE = (
+    "free",
+    "name",
+    "channels",
+    "noise",
+    "fixed",
+    "standard_uncertainty",
+    "rate",
+    "substeps",
+    "begin",
+    "given",
+)
+"""What a file may say besides."""
 BY_ORDER = 10.0
 """Ratio of positive bounds from which a range is searched by the logarithm."""
 
 
 @dataclass(frozen=True, eq=False)
 class ModelSetup(Result):
-    """A user-defined model and what is to be found of it.
+    """A machine and what is to be found of it.
 
-    It is what a `ParameterSet` and a `FitSetup` together are of a drive.
+    It is what a `ParameterSet` and a `FitSetup` together are of a drive. Of a `Machine` all numbers
+    that are not free stay as they are, as do its options and givens; of a `Model`, which has no
+    numbers, each is free or `fixed`.
 
-    An entry of `free` is (low, nominal, high), (low, nominal, high, unit) or an `Unknown`. A range
-    of positive bounds, the upper one at least ten times the lower one, is searched by its
-    logarithm. ``"start.PATH"`` of a state and ``"offset CHANNEL"``, the zero of a sensor, are free
-    in each run by themselves.
+    Of a name that is a path the last word is enough where it is unique. An entry of `free` is
+    (low, high), which begins at the machine's number, (low, nominal, high), each with a unit behind
+    it if you like, or an `Unknown`. A range of positive bounds, the upper one at least ten times
+    the lower one, is searched by its logarithm. ``"start.PATH"`` of a state and ``"offset
+    CHANNEL"``, the zero of a sensor, are free in each run by themselves.
+
+    Examples
+    --------
+    >>> from swashplate import FullOrderDrive
+    >>> from swashplate.identification import ModelSetup
+    >>> machine = FullOrderDrive.preset("hoist").by_current
+    >>> setup = ModelSetup(machine, {"load_inertia": (10.0, 1e4)}, rate=512.0)
+    >>> setup.free["plant.machine.load_inertia"].start
+    150.0
     """
 
     model: Any
-    """A model of equations, a `UserModel` of them with more said, or an object with `simulate`."""
+    """A `Machine`, of equations or a `BlackBox`, or a `Model` without numbers."""
     free: Mapping[str, Any]
-    """What is to be found, by the model's names."""
+    """What is to be found, by the machine's names."""
     name: str = ""
-    """For tables and files; the model's by default."""
+    """For tables and files; the machine's by default."""
     channels: tuple[str, ...] = ()
-    """Those that are fitted; all that the model gives by default."""
+    """Those that are fitted; all that the machine gives by default."""
     noise: Mapping[str, float] = field(default_factory=dict)
     """Standard deviation of a channel, if the campaign does not state it. [unit]"""
     fixed: Mapping[str, float] = field(default_factory=dict)
-    """Values of names that are not free."""
+    """Values of names that are not free, in the place of the machine's."""
     standard_uncertainty: Mapping[str, StandardUncertainty] = field(default_factory=dict)
-    """What values of `fixed` may be off by, one standard deviation, also as ``"5 %"``."""
+    """What values that are not free may be off by, one standard deviation, also as ``"5 %"``."""
+    rate: float | None = None
+    """Samples a second; by default the input's. Needed if its stamps are not even. [Hz]"""
+    substeps: int | None = None
+    """Steps of the equations a sample; by default one, or so many as the longest step demands."""
+    begin: Mapping[str, str] = field(default_factory=dict)
+    """Channel that says where a number of the state begins, by its path: at the first sample that
+    counts."""
+    given: Any = None
+    """What is given of the runs, if not the machine's: one for all, or a mapping by their names."""
     numbers: Mapping[str, float] = field(default_factory=dict)
-    """The model's numbers, nominal or fitted, those of single runs left out; see `nominal`."""
+    """Its numbers, nominal or fitted, those of single runs left out; see `nominal`."""
     scales: Mapping[str, float] = field(default_factory=dict)
     """What one unit of residual is, by channel: its noise. [unit]"""
 
@@ -86,51 +134,71 @@ class ModelSetup(Result):
             check_mapping(table, getattr(self, table))
         if isinstance(self.channels, str):
             raise InputError(f"Give the channels as ('{self.channels}',).")
-        model = UserModel(self.model) if isinstance(self.model, Equations) else self.model
-        if not callable(getattr(model, "simulate", None)):
-            raise InputError(
-                f"A {type(model).__name__} is not a model: give a Model of equations, or an object "
-                "with simulate(values, experiment)."
-            )
-        equations = model.model if isinstance(model, UserModel) else model
-        kind = getattr(equations, "name", None) or type(equations).__name__
-        name = self.name or str(kind).lower()
+        machine = self.measured
+        name = self.name or machine.name.lower()
+        for table in ("free", "fixed", "standard_uncertainty"):
+            by_path = {_full(key, machine): entry for key, entry in getattr(self, table).items()}
+            object.__setattr__(self, table, by_path)
         self._check_free_and_fixed(name)
         _check_numbers(f"{name}: the noise", self.noise, 0.0)
         _check_numbers(f"{name}: the fixed value", self.fixed, -inf)
-        free = {key: _unknown(key, entry) for key, entry in self.free.items()}
-        if isinstance(model, UserModel):
-            targets = [target for unknown in free.values() for target in unknown.targets]
-            _check_names(model, "free", targets)
-            _check_names(model, "fixed", self.fixed)
-        if isinstance(equations, Equations):
-            _check_ranges(name, equations, free, self.fixed)
-        object.__setattr__(self, "model", model)
+        ranges = [key for key, entry in self.free.items() if not isinstance(entry, Unknown)]
+        _check_names(machine, "free", ranges)
+        free = {key: _unknown(key, entry, machine) for key, entry in self.free.items()}
+        targets = [target for unknown in free.values() for target in unknown.targets]
+        _check_names(machine, "free", targets)
+        _check_names(machine, "fixed", self.fixed)
+        _check_ranges(name, machine, free, self.fixed)
         object.__setattr__(self, "name", name)
         object.__setattr__(self, "free", free)
-        _ = self.setup  # refuses what is not an uncertainty
-
-    def _check_free_and_fixed(self, name: str) -> None:
-        """Refuse a setup without anything free, or with a name in two tables."""
-        if not self.free:
-            raise InputError(f"Nothing of {name} is free: name the parameters to estimate.")
-        without_value = [key for key in self.standard_uncertainty if key not in self.fixed]
+        without_value = [key for key in self.standard_uncertainty if key not in self.held]
         if without_value:
             raise InputError(
                 f"{without_value[0]} has a standard uncertainty but no value: name it in fixed, or "
                 "give it a prior if it is free."
             )
+        _ = self.setup  # refuses what is not an uncertainty
+
+    @cached_property
+    def measured(self) -> MeasuredEquations | MeasuredBlackBox:
+        """The machine as experiments drive and measure it: what a `Problem` simulates."""
+        return measured(
+            self.model,
+            rate=self.rate,
+            substeps=self.substeps,
+            begin=self.begin,
+            given=self.given,
+        )
+
+    @cached_property
+    def held(self) -> Mapping[str, float]:
+        """Values of what is not free, the machine's own and those of `fixed`."""
+        free = {target for unknown in self.free.values() for target in unknown.targets}
+        own = {name: value for name, value in self.measured.numbers.items() if name not in free}
+        return own | dict(self.fixed)
+
+    def definition(self, name: str) -> Definition:
+        """What one of its numbers is; empty where the machine does not say it."""
+        definitions = self.measured.ports.parameter_definitions
+        last = name.rpartition(".")[2]
+        stated = definitions.get(name, Definition(last, ""))
+        return stated if stated.name != last else Definition("", "")
+
+    def _check_free_and_fixed(self, name: str) -> None:
+        """Refuse a setup without anything free, or with a name in two tables."""
+        if not self.free:
+            raise InputError(f"Nothing of {name} is free: name the parameters to estimate.")
         both = [key for key in self.free if key in self.fixed]
         if both:
             raise InputError(f"{both[0]} of {name} is free and fixed: name it in one of them.")
 
     @classmethod
     def from_file(cls, path: str | Path) -> ModelSetup:
-        """The fit setup that a Python file states by its names ``model`` and ``free``.
+        """The fit setup that a Python file states by its names ``machine`` and ``free``.
 
-        Besides those it may have ``name``, ``channels``, ``noise``, ``fixed`` and
-        ``standard_uncertainty``. The file is executed, as a module that worker processes import as
-        well.
+        A file without a ``machine`` has a ``model``. Besides it may have ``name``, ``channels``,
+        ``noise``, ``fixed``, ``standard_uncertainty``, ``rate``, ``substeps``, ``begin`` and
+        ``given``. The file is executed, as a module that worker processes import as well.
 
         Raises
         ------
@@ -140,15 +208,16 @@ class ModelSetup(Result):
             If it lacks one of the names.
         """
         module = loaded_module(path)
-        for name in ("model", "free"):
+        word = next((each for each in IN_FILE if hasattr(module, each)), IN_FILE[0])
+        for name in (word, "free"):
             if not hasattr(module, name):
                 raise InputError(
-                    f"{path} has no '{name}': it needs model = Model(...) and free = "
-                    "{'lag': (0.005, 0.06, 0.5), ...}, lower bound, nominal value and upper bound."
+                    f"{path} has no '{name}': it needs machine = Machine(model, ...) and free = "
+                    "{'lag': (0.005, 0.5), ...}, lower and upper bound."
                 )
-        names = ("model", "free", "name", "channels", "noise", "fixed", "standard_uncertainty")
+        stated = {name: getattr(module, name) for name in BESIDE if hasattr(module, name)}
         try:
-            return cls(**{key: getattr(module, key) for key in names if hasattr(module, key)})
+            return cls(getattr(module, word), **stated)
         except SwashplateError as error:
             raise type(error)(f"{path}: {error}") from None
 
@@ -175,7 +244,7 @@ class ModelSetup(Result):
                 f"but the channels are {', '.join(measured) or 'none'}."
             )
         problem = self.problem(experiments)
-        numbers = {**self.fixed, **problem.unknowns.targets(problem.start, "")}
+        numbers = {**self.held, **problem.unknowns.targets(problem.start, "")}
         return replace(self, numbers=numbers, scales=problem.scales)
 
     def problem(self, experiments: Sequence[Experiment], *, threads: int = 1) -> Problem:
@@ -198,9 +267,9 @@ class ModelSetup(Result):
         unknowns = [unknown for unknown in self.free.values() if unknown.name not in of_any_run]
         for run in runs:
             unknowns += self.unknowns_of_run(run)
-        values, zeros = _without_zeros(self.fixed, channels)
+        values, zeros = _without_zeros(self.held, channels)
         return Problem(
-            self.model,
+            self.measured,
             tuple(runs),
             Unknowns(tuple(unknowns)),
             channels,
@@ -208,42 +277,28 @@ class ModelSetup(Result):
             fixed=values,
             zeros=zeros,
             uncertain=tuple(
-                {name: deviation(stated, self.fixed[name])}
+                {name: deviation(stated, self.held[name])}
                 for name, stated in self.standard_uncertainty.items()
             ),
-            threads=threads if isinstance(self.model, UserModel) else 1,
+            threads=threads if self.measured.threads_help else 1,
         )
 
     def _channels_given(self, experiments: Sequence[Experiment]) -> tuple[str, ...]:
-        """Names of the channels that the model gives; one that it does not know is refused."""
-        values = {unknown.name: unknown.start for unknown in self.free.values()} | dict(self.fixed)
+        """Names of the channels that the machine gives; one that it does not know is refused."""
         given = dict[str, None]()
         for experiment in experiments:
-            if isinstance(self.model, UserModel):
-                names = [*self.model.signals_of(experiment)]
-                taken = {*self.model.model.external, *self.model.begin.values()}
-                signals = self.model.signals
-            else:
-                read = _ReadChannels(experiment.channels)
-                names = [*simulated(self.model, values, replace(experiment, channels=read))]
-                taken = read.names
-                signals = [*names, *sorted(taken)]
-            self._check_channels(experiment, names, taken, signals)
+            names = [*self.measured.signals_of(experiment)]
+            self._check_channels(experiment, names)
             given |= dict.fromkeys(names)
         return tuple(given)
 
-    def _check_channels(
-        self,
-        experiment: Experiment,
-        given: Collection[str],
-        taken: Collection[str],
-        signals: Sequence[str],
-    ) -> None:
-        """Refuse a channel that the model neither gives nor takes: its name may be a slip."""
+    def _check_channels(self, experiment: Experiment, given: Collection[str]) -> None:
+        """Refuse a channel that the machine neither gives nor takes: its name may be a slip."""
+        machine = self.measured
         for name in experiment.channels:
-            if name in given or name in taken:
+            if name in given or machine.takes(name):
                 continue
-            unmeasured = [signal for signal in signals if signal not in experiment.channels]
+            unmeasured = [each for each in machine.signals if each not in experiment.channels]
             without_channel = ""
             if unmeasured:
                 without_channel = f" Signals of the model without a channel: {listed(unmeasured)}."
@@ -258,7 +313,6 @@ class ModelSetup(Result):
         """The unknowns of a single run: where its state begins, and the zeros of its sensors."""
         run = experiment.name
         channels = {zero_name(name): name for name in experiment.channels}
-        equations = self.model.model if isinstance(self.model, UserModel) else None
         unknowns = list[Unknown]()
         for unknown in self.free.values():
             if unknown.run is not None:
@@ -266,7 +320,7 @@ class ModelSetup(Result):
             channel = channels.get(unknown.name)
             if channel:
                 unknowns.append(replace(unknown, run=run, kind="zero", channel=channel))
-            elif equations is not None and states_started_by(equations, unknown.name):
+            elif self.measured.starts(unknown.name):
                 unknowns.append(replace(unknown, run=run, kind="start"))
         return tuple(unknowns)
 
@@ -280,11 +334,11 @@ class ModelSetup(Result):
         unknowns = tuple(unknown for unknown in of_run if unknown.name not in self.numbers)
         channels = tuple(name for name in self.scales if name in experiment.channels)
         if not unknowns:
-            outputs = simulated(self.model, self.numbers, experiment)
+            outputs = simulated(self.measured, self.numbers, experiment)
             return {name: outputs[name] for name in channels}
         values, zeros = _without_zeros(self.numbers, channels)
         problem = Problem(
-            self.model,
+            self.measured,
             (experiment,),
             Unknowns(unknowns),
             channels,
@@ -336,25 +390,6 @@ def loaded_module(path: str | Path) -> ModuleType:
     return module
 
 
-class _ReadChannels(Mapping[str, Channel]):
-    """Channels of an experiment that remember which of them a model asked for."""
-
-    def __init__(self, channels: Mapping[str, Channel]) -> None:
-        self._channels = channels
-        self.names = set[str]()
-        """Names that were asked for, whether there is such a channel or not."""
-
-    def __getitem__(self, name: str) -> Channel:
-        self.names.add(name)
-        return self._channels[name]
-
-    def __iter__(self) -> Iterator[str]:
-        return iter(self._channels)
-
-    def __len__(self) -> int:
-        return len(self._channels)
-
-
 def _without_zeros(
     values: Mapping[str, float], channels: Sequence[str]
 ) -> tuple[dict[str, float], dict[str, float]]:
@@ -372,11 +407,17 @@ def _check_numbers(table: str, numbers: Mapping[str, float], least: float) -> No
             raise InputError(f"{table} of '{key}' is {number!r}, but must be {must}.")
 
 
+def _full(name: str, machine: MeasuredMachine) -> str:
+    """The path of a parameter whose last word is given, if it is the only such one."""
+    known = [*machine.ports.parameter_definitions, *map(zero_name, machine.signals)]
+    return name if name in known or machine.starts(name) else full_name(name, known)
+
+
 def _check_ranges(
-    name: str, equations: Equations, free: Mapping[str, Unknown], fixed: Mapping[str, float]
+    name: str, machine: MeasuredMachine, free: Mapping[str, Unknown], fixed: Mapping[str, float]
 ) -> None:
-    """Refuse bounds and values that the model's parameters cannot have."""
-    for key, definition in equations.ranges.items():
+    """Refuse bounds and values that the machine's parameters cannot have."""
+    for key, definition in machine.ports.ranges.items():
         if key in free:
             for bound in (free[key].low, free[key].high):
                 if not definition.holds(bound):
@@ -387,30 +428,40 @@ def _check_ranges(
             check_plausible(f"{name}, fixed: {key}", definition, fixed[key])
 
 
-def _check_names(model: UserModel, table: str, names: Iterable[str]) -> None:
+def _check_names(machine: MeasuredMachine, table: str, names: Iterable[str]) -> None:
     """Refuse a name that is neither a parameter, a start of a state nor the zero of a signal."""
-    paths, zeros = parameter_paths(model.model), [*map(zero_name, model.signals)]
+    paths, zeros = machine.ports.parameter_definitions, [*map(zero_name, machine.signals)]
     for name in names:
-        if name not in (*paths, *zeros) and not states_started_by(model.model, name):
+        if name not in (*paths, *zeros) and not machine.starts(name):
             raise UnknownNameError(
-                f"{model.model.name} has no parameter '{name}', which {table} names"
+                f"{machine.ports.name} has no parameter '{name}', which {table} names"
                 f"{meant(name, paths)}; it has {', '.join(paths)}."
             )
 
 
-def _unknown(name: str, entry: Range | Unknown) -> Unknown:
+def _unknown(name: str, entry: Range | Unknown, machine: MeasuredMachine) -> Unknown:
+    """What is to be found, of a range from the machine's number on unless one is said."""
     if isinstance(entry, Unknown):
         if name not in (entry.name, *entry.sets):
             raise InputError(
                 f"'{name}' is free as the parameter '{entry.name}': give both one name."
             )
         return entry
+    definition = machine.ports.parameter_definitions.get(name)
+    unit = definition.unit if definition else ""
     try:
-        low, start, high = (float(number) for number in entry[:3])
-        (unit,) = entry[3:] or ("",)
+        *bounds, last = entry
+        if isinstance(last, str):
+            unit = last
+        else:
+            bounds.append(last)
+        if len(bounds) == 2 and name in machine.numbers:
+            bounds.insert(1, machine.numbers[name])
+        low, start, high = (float(number) for number in bounds)
     except (TypeError, ValueError):
         raise InputError(
-            f"{name} is free as {entry!r}: give lower bound, nominal value and upper bound, and "
-            "the unit if you like, or an Unknown."
+            f"{name} is free as {entry!r}: give lower bound, nominal value and upper bound, of "
+            "which a number of a Machine needs no nominal value, and the unit if you like; or an "
+            "Unknown."
         ) from None
-    return Unknown(name, start, low, high, str(unit), low > 0.0 and high >= BY_ORDER * low)
+    return Unknown(name, start, low, high, unit, low > 0.0 and high >= BY_ORDER * low)

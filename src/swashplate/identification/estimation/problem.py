@@ -21,18 +21,19 @@ from swashplate.identification.estimation.arrow import (
     triangular_factor,
     whitening,
 )
+from swashplate.identification.estimation.measured_machine import measured
 from swashplate.identification.estimation.model import (
     RELATIVE_STEP,
     EquationModel,
     Linearised,
     MachineModel,
     SimulationRequest,
-    UserModel,
     linearised,
     part_of,
     simulated,
 )
 from swashplate.identification.estimation.unknowns import Unknowns
+from swashplate.machine import Machine
 from swashplate.machine import Model as OfEquations
 from swashplate.machine.marching import ObservedRecord
 from swashplate.results import Result, short
@@ -92,19 +93,22 @@ class Problem(Result):
 
     Examples
     --------
-    >>> import numpy as np
-    >>> from swashplate import Campaign, maneuvers, rig
+    >>> from swashplate import BlackBox, Campaign, maneuvers, rig
     >>> from swashplate.identification import Problem, Unknown, Unknowns
-    >>> class Gain:
-    ...     def simulate(self, values, experiment):
-    ...         command, speed = experiment.input, experiment["shaft_speed"]
-    ...         volts = np.interp(speed.time, command.time, command.values)
-    ...         return {"shaft_speed": values["gain"] * volts}
+    >>> def gained(time, inputs, numbers):
+    ...     return {"shaft_speed": numbers["gain"] * inputs["voltage"]}
+    >>> machine = BlackBox(
+    ...     "gain",
+    ...     gained,
+    ...     inputs=("voltage",),
+    ...     outputs=("shaft_speed",),
+    ...     numbers={"gain": 0.3},
+    ... )
     >>> sine = {"sine": maneuvers.sine(9.0, 0.1)}
     >>> tests = rig.run("hoist", sine, channels=("shaft_speed",))
     >>> campaign = Campaign.from_toml(rig.write(tests, "sines"))
     >>> problem = Problem(
-    ...     Gain(),
+    ...     machine,
     ...     campaign.experiments,
     ...     Unknowns((Unknown("gain", 0.3, 0.01, 1.0, "rad/(s V)"),)),
     ...     channels=("shaft_speed",),
@@ -115,7 +119,8 @@ class Problem(Result):
     """
 
     model: MachineModel
-    """A model of equations, bare or in a `UserModel`, or an object with `simulate`."""
+    """A machine, a model of equations without numbers, or what `ModelSetup` and drives make of
+    theirs."""
     experiments: tuple[Experiment, ...]
     unknowns: Unknowns
     channels: tuple[str, ...]
@@ -137,8 +142,8 @@ class Problem(Result):
     _last: dict[Any, Evaluation] = field(default_factory=dict, repr=False, init=False)
 
     def __post_init__(self) -> None:
-        if isinstance(self.model, OfEquations):
-            object.__setattr__(self, "model", UserModel(self.model))
+        if isinstance(self.model, Machine | OfEquations):
+            object.__setattr__(self, "model", measured(self.model))
         if not self.unknowns:
             raise InputError("A fit needs at least one parameter.")
         if not self.experiments:

@@ -14,8 +14,9 @@ from swashplate.errors import InputError, ParameterError
 from swashplate.machine.fields import Definition, check_mapping
 from swashplate.machine.marching.record import Record, Sampling, least_substeps, on_grid
 from swashplate.machine.marching.run import Machine
-from swashplate.machine.model import Model, full_name
+from swashplate.machine.model import full_name
 from swashplate.machine.plausible import check_plausible
+from swashplate.machine.ports import Ports
 from swashplate.units import in_si
 
 Array = NDArray[np.float64]
@@ -60,31 +61,31 @@ def inputs_of(
         For signals that do not fit the model or lie beyond their range.
     """
     check_mapping("inputs", inputs)
-    model = machine.model
-    inputs = {full_name(name, model.external): each for name, each in inputs.items()}
+    ports = machine.ports
+    inputs = {full_name(name, ports.external): each for name, each in inputs.items()}
     machine.check_inputs(inputs)
     if not inputs:
-        needed = ", ".join(model.external) or "an input, but its equations take none"
+        needed = ", ".join(ports.external) or "an input, but its equations take none"
         raise InputError(f"{machine.name} needs a record of {needed}.")
     rate = in_si(rate, "Hz", "The rate")
     if sampling.get("time") is not None:
         sampling["time"] = in_si(sampling["time"], "s", "The time")
-    sampling["substeps"] = substeps_of(model, rate, sampling.get("substeps"))
-    samples = {name: _samples(model, name, signal, rate) for name, signal in inputs.items()}
+    sampling["substeps"] = substeps_of(ports, rate, sampling.get("substeps"))
+    samples = {name: _samples(ports, name, signal, rate) for name, signal in inputs.items()}
     return {
-        name: within_range(model, name, record, clip=sampling.get("clip", False))
+        name: within_range(ports, name, record, clip=sampling.get("clip", False))
         for name, record in on_grid(samples, rate, **sampling).items()
     }
 
 
-def substeps_of(model: Model, rate: float, requested: int | None) -> int | None:
+def substeps_of(ports: Ports, rate: float, requested: int | None) -> int | None:
     """Steps a sample that keep a model's step as short as it must be, or those requested."""
-    if model.longest == inf:
+    if ports.longest == inf:
         return requested
-    return least_substeps(rate, requested, model.longest)
+    return least_substeps(rate, requested, ports.longest)
 
 
-def _samples(model: Model, name: str, signal: ArrayLike | Command, rate: float) -> ArrayLike:
+def _samples(ports: Ports, name: str, signal: ArrayLike | Command, rate: float) -> ArrayLike:
     """Samples of an input in its SI unit."""
     if isinstance(signal, np.ndarray):  # told sooner than what has a method or a unit
         return signal
@@ -95,14 +96,14 @@ def _samples(model: Model, name: str, signal: ArrayLike | Command, rate: float) 
         )
     if isinstance(signal, Command):
         return signal.sample(rate)
-    definition = model.input_definitions.get(name)
+    definition = ports.input_definitions.get(name)
     samples: ArrayLike = signal
     if definition is not None:
         samples = in_si(signal, definition.unit, f"The {name}")
     return samples
 
 
-def within_range(model: Model, name: str, record: Record, *, clip: bool = False) -> Record:
+def within_range(ports: Ports, name: str, record: Record, *, clip: bool = False) -> Record:
     """An input's record; one beyond the range of the input is refused, or clipped on request.
 
     Raises
@@ -110,12 +111,12 @@ def within_range(model: Model, name: str, record: Record, *, clip: bool = False)
     InputError
         The sentence names the first such sample, and what the input is.
     """
-    definition = model.input_definitions.get(name)
+    definition = ports.input_definitions.get(name)
     if definition is None:
         return record
-    if name not in model.input_ranges and definition.plausible is None:
+    if name not in ports.input_ranges and definition.plausible is None:
         return record
-    least, most = model.input_ranges.get(name, (-inf, inf))
+    least, most = ports.input_ranges.get(name, (-inf, inf))
     values = record.values
     low, high = float(values.min()), float(values.max())
     if definition.plausible is not None:

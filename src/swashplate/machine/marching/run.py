@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence, Set
 from dataclasses import dataclass, field, fields
-from functools import cached_property
+from functools import cached_property, lru_cache
 from itertools import count
 from types import MappingProxyType
 from typing import Any, Literal, NamedTuple, TypeVar
@@ -33,7 +33,13 @@ from swashplate.machine.marching.interpreting import InterpretedMarch
 from swashplate.machine.marching.kernels import KERNEL_KINDS, Kernel, MarchArrays, pointers
 from swashplate.machine.marching.march import march_text
 from swashplate.machine.marching.part_code import SignalId, taps_of
-from swashplate.machine.marching.sample_code import CodeForm, SampleCode, decisions_of
+from swashplate.machine.marching.record import Record
+from swashplate.machine.marching.sample_code import (
+    CodeForm,
+    SampleCode,
+    decisions_of,
+    output_of,
+)
 from swashplate.machine.model import (
     Link,
     Model,
@@ -43,6 +49,7 @@ from swashplate.machine.model import (
     state_paths,
     tap_delay,
 )
+from swashplate.machine.ports import Ports
 from swashplate.machine.renewal import renew
 from swashplate.machine.rules import CheckedRule, MemberRules, refuse
 from swashplate.units import in_si
@@ -129,10 +136,9 @@ class Machine:
     def __init__(self, model: Model, p: Any, *, options: Any = None, given: Any = None) -> None:
         renew(model)
         self._set(model, _checked_parts(model, p, options, given), model.name)
-        values = dict(zip(parameter_paths(model), self.params.tolist(), strict=True))
         for path, definition in model.ranges.items():
-            if not definition.holds(values[path]):
-                raise ParameterError(f"{self.name}: {definition.broken(path, values[path])}.")
+            if not definition.holds(self.numbers[path]):
+                raise ParameterError(f"{self.name}: {definition.broken(path, self.numbers[path])}.")
 
     @classmethod
     def of_parts(
@@ -192,7 +198,7 @@ class Machine:
         >>> [part.p.Z16_plus for part in wider.parts if part.p._fields[0] == "Z1"]
         [0.0002, 0.00011634]
         """
-        numbers = dict(zip(parameter_paths(self.model), self.params.tolist(), strict=True))
+        numbers = dict(self.numbers)
         changed = dict[str, float]()
         for name, change in {**(changes or {}), **by_name}.items():
             changed |= self._changes(name, change)
@@ -239,6 +245,32 @@ class Machine:
         """The machine whose numbers mean the same at a step [s], itself if they do."""
         del h
         return self
+
+    @property
+    def ports(self) -> Ports:
+        """What it takes, gives and is set by, by name."""
+        return self.model
+
+    @cached_property
+    def numbers(self) -> Mapping[str, float]:
+        """Its parameters by path."""
+        return dict(zip(parameter_paths(self.model), self.params.tolist(), strict=True))
+
+    def with_given(self, given: Any) -> Machine:
+        """The machine with other givens, as of a run of its own.
+
+        Raises
+        ------
+        InputError
+            If they have not the type that the model declares.
+        """
+        parts = []
+        for part, numbers in zip(self.model.parts, self.parts, strict=True):
+            of_part = member_at(given, part.path) if self.model.is_joined else given
+            if part.given is not None and not isinstance(of_part, part.given):
+                raise InputError(_not_of_type(self.model, part, "given", part.given, of_part))
+            parts.append(numbers if part.given is None else numbers._replace(given=of_part))
+        return Machine.of_parts(self.model, tuple(parts), self.name, self.rules)
 
     @cached_property
     def options(self) -> tuple[Any, ...]:
@@ -315,17 +347,20 @@ class Machine:
 
     def check_inputs(self, signals: Collection[str]) -> None:
         """Refuse external signals that the model does not know, and the lack of those it needs."""
-        inputs = self.model.external
-        for signal in signals:
-            if signal not in inputs:
-                has = ", ".join(inputs) or "none"
-                raise InputError(f"{self.name} has no input '{signal}'; it has {has}.")
+        self._check_known(signals)
         for index, part in enumerate(self.model.parts):
             for name in part.input_types:
                 signal = part.tap(name).signal
                 outside = self.model.link_of(index, name) is None and name not in part.defaults
                 if outside and signal not in signals:
                     raise InputError(f"{self.name}: {part.name} needs the signal '{signal}'.")
+
+    def _check_known(self, signals: Collection[str]) -> None:
+        inputs = self.ports.external
+        for signal in signals:
+            if signal not in inputs:
+                has = ", ".join(inputs) or "none"
+                raise InputError(f"{self.name} has no input '{signal}'; it has {has}.")
 
     def check_step(self, h: float) -> None:
         """Refuse a step [s] at which the equations of a part are not stable."""
@@ -405,6 +440,42 @@ class Machine:
             arguments_of_parts.append(arguments)
         return InitialStates(tuple(states), signals_before, tuple(arguments_of_parts), between)
 
+    def signals_under(
+        self,
+        records: Mapping[str, Record],
+        start: Start,
+        begin: Mapping[str, float],
+        *,
+        first: tuple[str, ...] = (),
+        states: bool = True,
+        everything: bool = False,
+    ) -> dict[str, Array]:
+        """Signals under inputs, on the grid of these, by name.
+
+        Those named `first` or, if none is named, all; if everything is wanted the others as well,
+        and limits as sums of bits. Numbers of the state are among them with `states`.
+        """
+        record = next(iter(records.values()))
+        self.check_step(record.step)
+        outputs = march_outputs(self.model, first, states=states)
+        table = marched(
+            self,
+            {name: each.values for name, each in records.items()},
+            record.step,
+            self.start(
+                {n: float(each.values[0]) for n, each in records.items()}, record.step, start
+            ),
+            tuple(outputs.first.values()),
+            next(iter(records)),
+            begin,
+            further=tuple(outputs.further.values()),
+            everything=everything,
+        )
+        names = [*outputs.first]
+        if everything:
+            names += outputs.further
+        return dict(zip(names, table, strict=True))
+
     def _state(self, part: Model, arguments: Mapping[str, Any], start: Start) -> Any:
         equation = part.rest if start == "rest" else part.settled
         if equation is not None:
@@ -482,6 +553,15 @@ def linked(
     return float(with_replacements(link.equation, replacements)(*values))
 
 
+def _not_of_type(model: Model, part: Model, what: str, kind: type[Any], value: Any) -> str:
+    """What is wrong with numbers of a part that have not the type which it declares."""
+    hint = ""
+    if model.is_joined:
+        fields = ", ".join(f"{field}=..." for field in getattr(model, what)._fields)
+        hint = f": those of {model.name} are its {what}({fields})"
+    return f"Model {part.name}: its {what} must be a {kind.__name__}, not {value!r}{hint}."
+
+
 def _checked_parts(model: Model, p: Any, options: Any, given: Any) -> tuple[PartNumbers, ...]:
     """Numbers of each part, of the types that the model declares."""
     parts = []
@@ -503,13 +583,7 @@ def _checked_parts(model: Model, p: Any, options: Any, given: Any) -> tuple[Part
                     raise InputError(f"Model {part.name} has no {what}, but is passed {value!r}.")
                 continue
             if not isinstance(value, kind):
-                hint = ""
-                if model.is_joined:
-                    fields = ", ".join(f"{field}=..." for field in getattr(model, what)._fields)
-                    hint = f": those of {model.name} are its {what}({fields})"
-                raise InputError(
-                    f"Model {part.name}: its {what} must be a {kind.__name__}, not {value!r}{hint}."
-                )
+                raise InputError(_not_of_type(model, part, what, kind, value))
             if what == "options" and any(option not in (None, True, False) for option in value):
                 raise InputError(
                     f"Model {part.name}: its options are None or False (off) or True (on), not "
@@ -561,6 +635,33 @@ def _march_of(planned: PlannedMarch) -> Kernel:
         lambda: march_text(model, form, dict(targets), dict(further)),
     )
     return code_of_text(f"{model.name}_march", text, KERNEL_KINDS)
+
+
+class MarchOutputs(NamedTuple):
+    """What a march computes, by name."""
+
+    first: dict[str, SignalId]
+    """Signals of the first march."""
+    further: dict[str, SignalId]
+    """Other signals, and limits, if it is to compute everything."""
+
+
+@lru_cache(maxsize=256)
+def march_outputs(
+    model: Model, first_signals: tuple[str, ...], *, states: bool = True
+) -> MarchOutputs:
+    """What the marches of a model compute; the first one all signals if none is named.
+
+    Numbers of the state are among them with `states`.
+    """
+    names = model.every_signal
+    if not states:
+        names = tuple(name for name in names if output_of(model, name)[0].kind != "state")
+    first = {name: output_of(model, name)[0] for name in first_signals or names}
+    further = {name: output_of(model, name)[0] for name in names if name not in first}
+    limited = dict.fromkeys(part for part, _ in model.limit_bits.values())
+    further |= {f"limits {part}": SignalId(part, "limits") for part in limited}
+    return MarchOutputs(first, further)
 
 
 def marched(

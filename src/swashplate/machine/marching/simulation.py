@@ -6,7 +6,7 @@ import sys
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from difflib import get_close_matches
-from functools import cached_property, lru_cache
+from functools import cached_property
 from math import isfinite
 from typing import (
     TYPE_CHECKING,
@@ -33,11 +33,10 @@ from swashplate.machine.marching.run import (
     Machine,
     Start,
     check_start,
-    marched,
 )
 from swashplate.machine.marching.sample_code import output_of
 from swashplate.machine.marching.stepping import CompiledStep, StepContext, bound_step
-from swashplate.machine.model import Model, full_name
+from swashplate.machine.model import full_name
 from swashplate.results import GivenAxes, Tabular, figures, pandas_frame
 from swashplate.units import in_si
 
@@ -50,33 +49,6 @@ Array = NDArray[np.float64]
 LARGEST = sys.float_info.max
 S = TypeVar("S")
 T = TypeVar("T", bound=np.generic)
-
-
-class MarchOutputs(NamedTuple):
-    """What a march computes, by name."""
-
-    first: dict[str, SignalId]
-    """Signals of the first march."""
-    further: dict[str, SignalId]
-    """Other signals, and limits, if it is to compute everything."""
-
-
-@lru_cache(maxsize=256)
-def march_outputs(
-    model: Model, first_signals: tuple[str, ...], *, states: bool = True
-) -> MarchOutputs:
-    """What the marches of a model compute; the first one all signals if none is named.
-
-    Numbers of the state are among them with `states`.
-    """
-    names = model.every_signal
-    if not states:
-        names = tuple(name for name in names if output_of(model, name)[0].kind != "state")
-    first = {name: output_of(model, name)[0] for name in first_signals or names}
-    further = {name: output_of(model, name)[0] for name in names if name not in first}
-    limited = dict.fromkeys(part for part, _ in model.limit_bits.values())
-    further |= {f"limits {part}": SignalId(part, "limits") for part in limited}
-    return MarchOutputs(first, further)
 
 
 def read_only(array: NDArray[T]) -> NDArray[T]:
@@ -124,24 +96,15 @@ class Run(Tabular):
 
     def _march(self, *, everything: bool = False) -> None:
         """Compute the signals of the first march, or all of them and the limits."""
-        self.instance.check_step(self.record.step)
-        outputs = march_outputs(self.instance.model, self.first_signals, states=self.has_states)
-        records = {name: record.values for name, record in self.records.items()}
-        table = marched(
-            self.instance,
-            records,
-            self.record.step,
-            self.initial,
-            tuple(outputs.first.values()),
-            self.driven_by,
+        signals = self.instance.signals_under(
+            self.records,
+            self.start,
             self.begin,
-            further=tuple(outputs.further.values()),
+            first=self.first_signals,
+            states=self.has_states,
             everything=everything,
         )
-        names = [*outputs.first]
-        if everything:
-            names += outputs.further
-        self.on_grid.update(zip(names, table, strict=True))
+        self.on_grid.update(signals)
 
     @property
     def initial(self) -> InitialStates:
@@ -177,14 +140,14 @@ class Run(Tabular):
     @cached_property
     def names(self) -> tuple[str, ...]:
         """``"time"``, the inputs, and all signals."""
-        model = self.instance.model
-        every = ("time", *self.records, *model.every_signal, *model.integrals)
+        ports = self.instance.ports
+        every = ("time", *self.records, *ports.every_signal, *ports.integrals)
         return tuple(dict.fromkeys(every))
 
     @property
     def limit_names(self) -> tuple[str, ...]:
         """Limits of the model."""
-        return tuple(self.instance.model.limit_bits)
+        return tuple(self.instance.ports.limit_bits)
 
     def __repr__(self) -> str:
         samples = f"{self.time.size} samples at {self.record.rate:g} Hz"
@@ -268,7 +231,7 @@ class Run(Tabular):
     @property
     def _usual(self) -> tuple[str, ...]:
         """Signals that `plot` shows of a user-defined model."""
-        outputs = self.instance.model.outputs
+        outputs = self.instance.ports.outputs
         usual = (*self.records, *outputs) if outputs else self.names[1:]
         return tuple(dict.fromkeys(usual))
 
@@ -345,7 +308,7 @@ class Run(Tabular):
         """A signal on the march's grid, `substeps` points a sample."""
         if signal in self.records:
             return self.records[signal].values
-        integrals = self.instance.model.integrals
+        integrals = self.instance.ports.integrals
         if signal in integrals and signal not in self.on_grid:
             rate = self.fine(integrals[signal])
             total = np.zeros_like(rate)
@@ -373,7 +336,7 @@ class Run(Tabular):
         InputError
             If the model has no such limit.
         """
-        limits = self.instance.model.limit_bits
+        limits = self.instance.ports.limit_bits
         if limit not in limits:
             names = ", ".join(limits) or "none"
             raise InputError(f"There is no limit '{limit}'; there are {names}.")

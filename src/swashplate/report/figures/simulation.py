@@ -292,7 +292,7 @@ def plot_signals(
 
 def _columns(run: Run, panels: Mapping[str, Panel]) -> dict[str, list[Panel]]:
     """Panels of signals by the heading of their column: one without, or states apart."""
-    states = {path for _, path in run.instance.model.places("state")}
+    states = run.instance.ports.state_signals
     columns = {
         "inputs and outputs": [panel for name, panel in panels.items() if name not in states],
         "states": [panel for name, panel in panels.items() if name in states],
@@ -348,7 +348,7 @@ def _definition(run: Run, signal: str) -> Definition:
     name = signal.replace("_", " ")
     if isinstance(run, Simulation | FullOrderSimulation):
         return Definition(name, SIGNAL_UNITS.get(signal, ""))
-    return run.instance.model.definitions.get(signal, Definition(name, ""))
+    return run.instance.ports.definitions.get(signal, Definition(name, ""))
 
 
 def _limit_shades(run: Run) -> dict[str, Shade]:
