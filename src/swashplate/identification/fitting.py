@@ -471,8 +471,7 @@ def _solved(
             start = approached(problem, loss=solver.keywords["loss"])
         first = solver
         if setup.has_spreads:
-            roughly = max(limits["tolerance"], BEFORE_WEIGHING)
-            first = partial(solver, tolerance=roughly, cliffs=0)
+            first = partial(solver, tolerance=max(limits["tolerance"], BEFORE_WEIGHING))
         solution = first(problem, start, hopeless=hopeless)
         solutions = ()
         planned = 1 + OTHERS
