@@ -299,15 +299,23 @@ def checked_ends(
     low, high = problem.bounds
     cost = problem.cost(vector)
     drive = isinstance(problem.model, DriveModel)
+    switches = np.array(
+        [
+            unknown.run is None and unknown.targets[0].startswith(SWITCHING)
+            for unknown in problem.unknowns
+        ]
+    )
     for index, unknown in enumerate(problem.unknowns):
         if unknown.run is not None:
             continue
-        bends = not drive or unknown.targets[0].startswith(SWITCHING)
+        bends = not drive or bool(switches[index])
         if not reach[index] > (0.0 if bends else STRAIGHT):
             continue
         direction = inverse[index] / inverse[index, index]
         rise = 0.5 * reach[index] ** 2 / inverse[index, index]
-        beforehand = problem.unknowns.prior_widths[index]
+        # thresholds that move together farther than is known of either beforehand
+        together = switches & (reach[index] * np.abs(direction) > problem.unknowns.prior_widths)
+        made_up_for = drive and bool(together[index]) and np.count_nonzero(together) > 1
         alone = index in limits and np.abs(np.delete(direction, index)).max(initial=0.0) < ALONE
         if index in limits and _unneeded(problem, vector, index, cost, rise):
             yield CheckedEnd(index, True, np.inf)
@@ -320,7 +328,7 @@ def checked_ends(
                 continue  # beyond the model's domain nothing is possible
             room = abs(float(bound - vector[index]))
             shallow, first = risen < SHALLOW * rise, float(reach[index])
-            steep = risen > STEEP * rise and (alone or (bends and drive and first > beforehand))
+            steep = risen > STEEP * rise and (alone or made_up_for)
             if steep:
                 along = sign * reach[index] * direction
                 first *= _part_within(problem, vector, along, cost + rise)
