@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
 from math import inf, log
@@ -325,7 +325,7 @@ class Uncertainty(Result):
                     "or a spectral line rather than noise, which intervals hardly cover."
                 )
         sentences += self.priors
-        sentences += [_end_sentence(self.own.variables.names[end.number], end) for end in self.ends]
+        sentences += _end_sentences(self.own.variables.names, self.ends)
         if self.runs is not None:
             sentences.append(
                 f"From run to run the motion's scale differs by {100.0 * self.runs.deviation:.2g} "
@@ -371,17 +371,30 @@ class Uncertainty(Result):
         return dict(sorted(shares.items(), key=lambda item: -item[1]))
 
 
-def _end_sentence(name: str, end: CheckedEnd) -> str:
-    """What a checked end of an unknown's interval says."""
-    side = "upper" if end.upper else "lower"
-    if end.better is not None:
-        return (
-            f"The search had not found the best fit: the interval of {name} led to a better one, "
-            f"cost {end.better:.6g}. Fit again with --starts 20 (in Python search = Search(20))."
-        )
-    if np.isfinite(end.distance):
-        return f"The {side} end of {name} is that of its profile, which is asymmetric."
-    return f"{name} has no {side} end: the cost does not rise enough on that side."
+def _end_sentences(names: Sequence[str], ends: Sequence[CheckedEnd]) -> Iterator[str]:
+    """What checked ends of intervals say."""
+    for end in ends:
+        if end.better is not None:
+            yield (
+                "The search had not found the best fit: the interval of "
+                f"{names[end.number]} led to a better one, cost {end.better:.6g}. Fit again with "
+                "--starts 20 (in Python search = Search(20))."
+            )
+    found = [end for end in ends if end.better is None]
+    of_profiles = list(
+        dict.fromkeys(names[end.number] for end in found if np.isfinite(end.distance))
+    )
+    if len(of_profiles) == 1:
+        yield f"The interval of {of_profiles[0]} follows the cost, which is not symmetric there."
+    elif of_profiles:
+        yield f"Intervals of {listed(of_profiles)} follow the cost, which is not symmetric there."
+    for end in found:
+        if not np.isfinite(end.distance):
+            side = "upper" if end.upper else "lower"
+            yield (
+                f"{names[end.number]} has no {side} end: the cost does not rise enough on that "
+                "side."
+            )
 
 
 def uncertainty(
