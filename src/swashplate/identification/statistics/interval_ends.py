@@ -185,7 +185,9 @@ def _crossing(
     low, high = low - 1.0, high - 1.0
     distance = far
     for _ in range(12):
-        if abs(high) <= close or abs(far - near) <= close * close * far:
+        # where the cost jumps over the threshold, no height is close: the jump is the end
+        at_a_jump = abs(far - near) <= close**2 * far
+        if abs(high) <= close or at_a_jump:
             break
         distance = far - high * (far - near) / (high - low)
         now = height(distance)
