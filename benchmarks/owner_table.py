@@ -218,7 +218,7 @@ def rows_of(folder, seed):
     drive, _, sensor, orifice = draw(seed)
     place = Path(folder) / f"{seed:02d}"
     judged = fitted(seed, place)
-    numbers = key_numbers(judged.fit)
+    numbers = judged.key_numbers
     tested = replace(drive.parameters, tested=numbers.commands)
     truth = key_numbers(Drive(tested))
     seconds = (place / "seconds.txt").read_text("utf-8").strip()

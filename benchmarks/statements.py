@@ -71,7 +71,8 @@ def stated_and_true(prediction, drive, run, largest):
         if (stated := classes.get(motion)) is None:
             yield row | {"stated": None, "printed": None}
             continue
-        model = np.mean(prediction.squares(signal[inside], rate[inside])) / prediction.reach**2
+        changes = rate[inside] / discrepancy.TIME
+        model = np.mean(prediction.squares(signal[inside], changes)) / prediction.reach**2
         error = 100.0 * float(np.sqrt(model + stated.left_open**2))
         yield row | {"stated": error, "printed": 100.0 * stated.error}
 

@@ -162,7 +162,7 @@ def test_what_is_known_of_the_noise_changes_nothing(seed: int, noise: float) -> 
 
 def _error(prediction: PredictionError) -> float:
     """Stated error of a sine, root mean square over the range."""
-    squares = prediction.squares(np.sin(TIME), 0.1 * np.cos(TIME))
+    squares = prediction.squares(np.sin(TIME), np.cos(TIME))
     return float(np.sqrt(np.mean(squares))) / prediction.reach
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
@@ -26,10 +26,19 @@ from swashplate.drive import (
     FirstChange,
     KeyNumber,
     KeyNumbers,
+    Simulation,
     command_unit,
 )
 from swashplate.errors import InputError, SwashplateError
-from swashplate.identification import Fit, Identification, Optimum, tested_commands
+from swashplate.identification import (
+    Fit,
+    Identification,
+    Optimum,
+    PredictionError,
+    error_of_motion,
+    prediction_errors,
+    tested_commands,
+)
 from swashplate.identification.estimation import limits_unreached
 from swashplate.identification.statistics import unseen_limits
 from swashplate.machine.marching import SOURCE_RATE
@@ -117,7 +126,7 @@ def key_numbers(machine: Drive | Fit | Identification) -> KeyNumbers:
             unreached=limits_unreached(machine.runs, machine.drive.parameters),
             tested=tested_commands(machine.runs),
         )
-        return numbers_of_fit(Drive(parameters), machine)
+        return numbers_of_fit(Drive(parameters), machine, prediction_errors(machine, ()))
     values = _Values(machine)
     try:
         found = _without_fit(machine, values)
@@ -126,14 +135,18 @@ def key_numbers(machine: Drive | Fit | Identification) -> KeyNumbers:
     return values.shown(found, _limits_of(machine, values))
 
 
-def numbers_of_fit(drive: Drive, fit: Optimum) -> KeyNumbers:
+def numbers_of_fit(
+    drive: Drive, fit: Optimum, predictions: Iterable[PredictionError]
+) -> KeyNumbers:
     """The numbers of a fitted drive with their intervals; see `key_numbers`.
 
-    The drive knows what its tests reached, and how its logs hold the command.
+    The drive knows what its tests reached, and how its logs hold the command. What is stated of
+    predictions widens the delay: h² = (1.96 σ)² + (e / a)², with the model's own error e of the
+    speed and the acceleration a at the instant at which the delay ends (`Band`).
     """
     values = _Values(drive)
     try:
-        found, remarks = _with_fit(drive, fit, values)
+        found, remarks = _with_fit(drive, fit, values, error_of_motion(predictions))
         limits = _limits_of(drive, values, unseen_limits(fit))
     except SwashplateError as error:
         return values.none(error)
@@ -194,9 +207,7 @@ class _Values:
 
     def _of_step(self, drive: Drive, volts: float, rest: float, final: float) -> Array:
         """Acceleration, delay and lag (3,) of a step from rest."""
-        command = np.full(int(SECONDS * SOURCE_RATE) + 1, volts)
-        command[0] = 0.0
-        run = drive.simulate(command, SOURCE_RATE, start="steady")
+        run = _step(drive, volts)
         direction = np.sign(volts)
         acceleration = direction * SOURCE_RATE * float((direction * np.diff(run.shaft_speed)).max())
         change = np.maximum.accumulate((run.shaft_speed - rest) / (final - rest))
@@ -204,6 +215,29 @@ class _Values:
             return np.array([acceleration, np.nan, np.nan])
         begin, end = np.interp((MOVES, MOST_OF_IT), change, run.time)
         return np.array([acceleration, begin, end - begin])
+
+    def own_error(self, numbers: Array, stated: PredictionError) -> Array:
+        """By how much the model's own error moves each of the numbers (8, 2): the delay's end.
+
+        Where its speed is off, so is the instant at which it gets there. The end of the lag moves
+        with that of the delay: of the shift that both have the lag keeps nothing.
+        """
+        moved = np.zeros(numbers.shape)
+        drive = self.drive
+        if drive.parameters.rate not in (None, SOURCE_RATE):
+            drive = drive.at_every_rate()
+        for side, direction in enumerate((1.0, -1.0)):
+            if not np.isfinite(numbers[DELAY, side]):
+                continue
+            run = _step(drive, direction * self.largest[side])
+            rates = np.gradient(run.shaft_speed, run.time)
+            speed, rate = (
+                np.interp([numbers[DELAY, side]], run.time, course)
+                for course in (run.shaft_speed, rates)
+            )
+            error = np.sqrt(stated.squares(speed, rate))
+            moved[DELAY, side] = float(error[0]) / abs(float(rate[0]))
+        return moved
 
     def shown(self, found: _Found, limits: _Limits) -> KeyNumbers:
         """The record of the numbers, in the stick's own volts."""
@@ -255,6 +289,13 @@ class _Values:
     def none(self, error: SwashplateError) -> KeyNumbers:
         """The record of a drive that has no such numbers."""
         return replace(self._record(), remarks=(f"This drive has none: {error}",))
+
+
+def _step(drive: Drive, volts: float) -> Simulation:
+    """A step from rest, from the first sample on."""
+    command = np.full(int(SECONDS * SOURCE_RATE) + 1, volts)
+    command[0] = 0.0
+    return drive.simulate(command, SOURCE_RATE, start="steady")
 
 
 def _logged_per_volt(stick: LoggedCommand | None) -> float:
@@ -310,7 +351,9 @@ def _without_fit(drive: Drive, values: _Values) -> _Found:
     return found
 
 
-def _with_fit(drive: Drive, fit: Optimum, values: _Values) -> tuple[_Found, list[str]]:
+def _with_fit(
+    drive: Drive, fit: Optimum, values: _Values, stated: PredictionError | None
+) -> tuple[_Found, list[str]]:
     """Numbers of a fitted drive with their 95 % intervals, and what these leave out."""
     numbers = values.of(drive)
     shape = numbers.shape
@@ -326,6 +369,8 @@ def _with_fit(drive: Drive, fit: Optimum, values: _Values) -> tuple[_Found, list
         _notes(values, found)
         return found, [f"There are no intervals: {error}"]
     half, below, above = (each.reshape(shape) for each in (spread.half, spread.below, spread.above))
+    if stated is not None:
+        half = np.hypot(half, values.own_error(numbers, stated))
     near = values.of(_at_limits(drive, unseen))
     far = values.of(without_limits(drive, unseen))
     moved = np.nanmax(np.abs([near - numbers, far - numbers]), axis=0)

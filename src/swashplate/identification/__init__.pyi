@@ -7,7 +7,10 @@ from .assessment import read_verdict as read_verdict
 from .assessment import tested_commands as tested_commands
 from .assessment import versions as versions
 from .band import Band as Band
+from .band import error_of_motion as error_of_motion
 from .band import speed_band as speed_band
+from .diagnostics.discrepancy import PredictionError as PredictionError
+from .diagnostics.discrepancy import prediction_errors as prediction_errors
 from .diagnostics.verdict import Verdict as Verdict
 from .diagnostics.verdict import assess_fit as assess_fit
 from .estimation.drive_model import DriveModel as DriveModel

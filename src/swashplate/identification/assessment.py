@@ -211,7 +211,9 @@ class Identification(Estimated):
         # by name, as it stands above this package
         answers = import_module("swashplate.analysis")
         with working("Computing the numbers that matter"):
-            return cast("KeyNumbers", answers.numbers_of_fit(self.drive, self.fit))
+            return cast(
+                "KeyNumbers", answers.numbers_of_fit(self.drive, self.fit, self.verdict.predictions)
+            )
 
     def tables(self) -> list[Table]:
         """Numbers that matter, stated errors, estimates, profiles, runs."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -9,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swashplate.drive import Drive, Simulation, drive_sensitivities
-from swashplate.identification.diagnostics.discrepancy import TIME, PredictionError
+from swashplate.identification.diagnostics.discrepancy import PredictionError
 from swashplate.identification.diagnostics.verdict import Verdict
 from swashplate.identification.estimation.posterior import Posterior
 from swashplate.identification.validation import percent
@@ -112,7 +113,7 @@ def speed_band(
     Band or None
         None if no run of the fit measured the motion of the shaft.
     """
-    stated = _of_shaft(verdict)
+    stated = error_of_motion(verdict.predictions)
     if stated is None:
         return None
     speed, time = run.shaft_speed, run.time
@@ -120,11 +121,11 @@ def speed_band(
     if posterior.names:
         by = drive_sensitivities(drive.parameters, run.records, run.start, posterior.names)
         variance = np.sum((by["shaft_speed"] @ posterior.changes) ** 2, axis=1)
-    errors = stated.squares(speed, TIME * np.gradient(speed, time))
+    errors = stated.squares(speed, np.gradient(speed, time))
     return Band(time, speed, np.sqrt(DEVIATIONS**2 * variance + errors), stated.reach)
 
 
-def _of_shaft(verdict: Verdict) -> PredictionError | None:
-    """What is stated of the channel that knows the shaft's motion best."""
-    of_shaft = [stated for stated in verdict.predictions if stated.unit in SPEEDS]
+def error_of_motion(predictions: Iterable[PredictionError]) -> PredictionError | None:
+    """What is stated of the channel that knows the motion of shaft or rod best."""
+    of_shaft = [stated for stated in predictions if stated.unit in SPEEDS]
     return min(of_shaft, key=lambda stated: stated.worst.error, default=None)

@@ -461,10 +461,10 @@ class PredictionError(Result):
     def squares(self, signal: Array, rate: Array) -> Array:
         """(n,) mean square that the model's own error does not exceed in nine of ten maneuvers.
 
-        [unit²], for what is predicted and its change within 0.1 s, (n,) each, of a position those
-        of its speed. [unit]
+        [unit²], for what is predicted and its rate of change, (n,) each, of a position those of its
+        speed. [unit, unit/s]
         """
-        terms = variance_terms(signal / self.reach, rate / self.reach)
+        terms = variance_terms(signal / self.reach, TIME * rate / self.reach)
         return np.asarray(self.reach**2 * (terms @ self.coefficients))
 
 
