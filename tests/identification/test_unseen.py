@@ -1,4 +1,4 @@
-"""What a guess from a motion does not see: a ramp of the current, gains that bend."""
+"""What a guess from a motion does not see: a ramp, what lies behind it, gains that bend."""
 
 from dataclasses import replace
 from math import isinf
@@ -37,6 +37,9 @@ def test_a_guess_from_a_motion_has_a_ramp() -> None:
     # 5 % of 0.45 A at 4.5 V beyond the dead zone; a search begins beside its bound
     assert free["J_plus"].prior.deviation == pytest.approx(0.05 * 0.45)
     assert nominal.numbers["J_plus"] == pytest.approx(0.01 * 0.45)
+    # a dead zone of the solenoids behind the ramp, 15 % of 0.8 A
+    assert free["Z17"].prior.deviation == pytest.approx(0.15 * 0.8)
+    assert nominal.numbers["Z17"] == pytest.approx(0.03 * 0.8)
     # a quadratic part that is 15 % of the linear one at 4.5 V beyond the dead zone
     bend = free["G2_plus"].prior
     assert (bend.mean, bend.deviation) == (0.0, pytest.approx(BEND * 0.1 / 4.5))
@@ -55,5 +58,6 @@ def test_other_drives_are_left_as_they_are() -> None:
     _, setup = with_unseen(of_current, whole_drive(of_current))
     assert "lim1" not in setup.free or not setup.free["lim1"].tied  # read off the current
     assert {"G2_plus", "J_plus"} <= setup.free.keys()
+    assert not setup.free.keys() & {"Z17"}
     assert not is_guessed(hoist)
     assert is_guessed(of_current)

@@ -1,10 +1,11 @@
-"""What a machine may do that a guess from its logs does not see: a jump, gains that bend, a ramp.
+"""What a machine may do that a guess from its logs does not see.
 
 A guess takes gains for straight, that of the amplifier and of the solenoids; and a ramp of a
 current that was not measured looks like a delay and a limited acceleration. Numbers that do not
 take these into account would be off by more than their intervals, so they become estimates. So
 does a jump at the edge of the dead zone: a smaller dead zone and a larger one with a jump look
-alike but near rest.
+alike but near rest. And so does the part of the dead zone that lies behind the ramp: a current has
+to grow to it, which makes a start from rest later than a change of speed.
 """
 
 from __future__ import annotations
@@ -26,6 +27,8 @@ beforehand, and its bounds, up to which more command never means less current. [
 JUMP, LARGEST, FIRST = 0.05, 0.3, 0.01
 """Jump of the current over that of the largest command: its standard deviation about 0 beforehand,
 its bound, and where a search begins, as one at its bound would stay there. [1]"""
+DEAD, DEADEST, SOME = 0.15, 0.5, 0.03
+"""The same of the solenoids' dead zone behind a current that was not measured. [1]"""
 FORCE, FARTHEST = 0.3, 1.2
 """Part of the solenoids' force at the current of the largest command that each power of the current
 beyond the first may have: its standard deviation about 0 beforehand, and its bounds. [1]"""
@@ -37,9 +40,10 @@ def is_guessed(nominal: Parameters) -> bool:
 
 
 def with_unseen(nominal: Parameters, setup: FitSetup) -> tuple[Parameters, FitSetup]:
-    """A guessed drive with a jump, gains that may bend and a limited rate; others as they are.
+    """A guessed drive with what its guess does not see; others as they are.
 
-    With a measured current, of which the solenoids' force was read off as well, that may bend too.
+    That is a jump, and gains that may bend, of the solenoids' force only if a current was measured,
+    from which it was read off; without one a limited rate, and a dead zone of the solenoids.
     """
     if not isinstance(nominal, ParameterSet) or not is_guessed(nominal) or not nominal.tested:
         return nominal, setup
@@ -70,6 +74,9 @@ def with_unseen(nominal: Parameters, setup: FitSetup) -> tuple[Parameters, FitSe
         limited = {"lim1": rate, "lim2": rate, "I_t1": 0.0, "I_t2": 0.0}
         changed |= {f"{name}_{side}": value for name, value in limited.items() for side in SIDES}
         free |= dict.fromkeys(("lim1", "lim2"), Free(spread=WITHIN, tied=True))
+        if numbers["Z17"] == 0.0:
+            changed["Z17"] = SOME * largest
+            free["Z17"] = Free(bounds=(0.0, DEADEST * largest), prior=Prior(0.0, DEAD * largest))
     return nominal.with_numbers(changed), setup.model_copy(update={"free": free})
 
 
