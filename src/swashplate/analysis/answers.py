@@ -141,8 +141,8 @@ def numbers_of_fit(
     """The numbers of a fitted drive with their intervals; see `key_numbers`.
 
     The drive knows what its tests reached, and how its logs hold the command. What is stated of
-    predictions widens the delay: h² = (1.96 σ)² + (e / a)², with the model's own error e of the
-    speed and the acceleration a at the instant at which the delay ends (`Band`).
+    predictions widens delay and lag: h² = (1.96 σ)² + (e / a)², with the model's own error e of the
+    speed (`Band`) and the acceleration a at the instants at which they end.
     """
     values = _Values(drive)
     try:
@@ -217,26 +217,24 @@ class _Values:
         return np.array([acceleration, begin, end - begin])
 
     def own_error(self, numbers: Array, stated: PredictionError) -> Array:
-        """By how much the model's own error moves each of the numbers (8, 2): the delay's end.
+        """By how much the model's own error moves each of the numbers (8, 2): delay and lag.
 
-        Where its speed is off, so is the instant at which it gets there. The end of the lag moves
-        with that of the delay: of the shift that both have the lag keeps nothing.
+        Where the speed is off by e and grows with a, the instant at which it gets there is off by
+        e/a. A lag has two such instants, which shift together in part: the larger of both counts.
         """
         moved = np.zeros(numbers.shape)
         drive = self.drive
         if drive.parameters.rate not in (None, SOURCE_RATE):
             drive = drive.at_every_rate()
         for side, direction in enumerate((1.0, -1.0)):
-            if not np.isfinite(numbers[DELAY, side]):
+            ends = numbers[DELAY, side], numbers[DELAY, side] + numbers[LAG, side]
+            if not np.isfinite(ends).all():
                 continue
             run = _step(drive, direction * self.largest[side])
-            rates = np.gradient(run.shaft_speed, run.time)
-            speed, rate = (
-                np.interp([numbers[DELAY, side]], run.time, course)
-                for course in (run.shaft_speed, rates)
-            )
-            error = np.sqrt(stated.squares(speed, rate))
-            moved[DELAY, side] = float(error[0]) / abs(float(rate[0]))
+            speed = np.interp(ends, run.time, run.shaft_speed)
+            rate = np.interp(ends, run.time, np.gradient(run.shaft_speed, run.time))
+            late = np.sqrt(stated.squares(speed, rate)) / np.abs(rate)
+            moved[DELAY, side], moved[LAG, side] = late[0], late.max()
         return moved
 
     def shown(self, found: _Found, limits: _Limits) -> KeyNumbers:
