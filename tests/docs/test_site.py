@@ -87,7 +87,7 @@ def left_raw(html: str) -> list[str]:
 def test_code_that_several_objects_could_be_is_no_link(scripts: ModuleType) -> None:
     links = scripts.import_module("code_links")
     names = ["a.Drive.step", "a.fit", "a.Drive", "b.Model", "c.Model"]
-    endings = links.objects_by_ending(dict.fromkeys(names))
+    endings = links.objects_by_ending(tuple((name, None) for name in names))
     assert {ending: name for ending, (name, _) in endings.items()} == {
         "a.Drive.step": "a.Drive.step",
         "Drive.step": "a.Drive.step",

@@ -25,7 +25,7 @@ from scipy.special import stdtrit
 from swashplate.campaign import UNNAMED, Experiment
 from swashplate.identification.estimation.posterior import mean_square_bound
 from swashplate.identification.estimation.problem import LinearisedFit, LinearisedRun
-from swashplate.identification.optimum import Optimum
+from swashplate.identification.optimum import Optimum, once_per_fit
 from swashplate.identification.validation import RunQuality
 from swashplate.results import Result
 
@@ -614,19 +614,22 @@ def errors_of_runs(
     """
     parts = list[tuple[RunQuality, Array | None, bool]]()
     if fit is not None and channel in fit.problem.channels:
-        maneuvers = {run.name: maneuver_of(run) for run in fit.problem.experiments}
-        errors = {
-            run.name: error
-            for run, error in left_out(fit.linearised, maneuvers)
-            if run.channel == channel
-        }
+        errors = _errors_left_out(fit)
         parts += [
-            (quality, errors[quality.experiment.name], False)
+            (quality, errors[quality.experiment.name, channel], False)
             for quality in fit.qualities
             if quality.channel == channel
         ]
     parts += [(quality, None, True) for quality in predicted if quality.channel == channel]
     return ErrorsOfRuns(tuple(parts))
+
+
+@once_per_fit
+def _errors_left_out(fit: Optimum) -> dict[tuple[str, str], Array]:
+    """By run and channel the differences (n,) if the maneuver of the run had been left out."""
+    maneuvers = {run.name: maneuver_of(run) for run in fit.problem.experiments}
+    found = left_out(fit.linearised, maneuvers)
+    return {(run.name, run.channel): errors for run, errors in found}
 
 
 def variance_function(cells: Sequence[WindowCell]) -> Array:
