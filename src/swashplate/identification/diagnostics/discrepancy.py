@@ -17,9 +17,9 @@ from typing import Literal, NamedTuple, get_args
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.fft import irfft, next_fast_len, rfft
 from scipy.ndimage import maximum_filter1d
 from scipy.optimize import nnls
-from scipy.signal import fftconvolve
 from scipy.special import stdtrit
 
 from swashplate.campaign import UNNAMED, Experiment
@@ -293,9 +293,19 @@ def windowed(values: Array, weights: Array) -> Array:
     sums = np.full(values.size, np.nan)
     if values.size > weights.size:
         # about the first sample: a position may begin far from 0
-        from_first = fftconvolve(values - values[0], weights, "valid")
+        from_first = _convolved(values - values[0], weights)
         sums[half : values.size - half] = from_first + values[0] * weights.sum()
     return sums
+
+
+def _convolved(values: Array, weights: Array) -> Array:
+    """(n - w + 1,) sums of values (n,) times weights (w,), where these overlap entirely.
+
+    As scipy.signal.fftconvolve, whose package takes a second to load.
+    """
+    size = next_fast_len(values.size + weights.size - 1, real=True)
+    product = rfft(values, size) * rfft(weights, size)
+    return np.asarray(irfft(product, size)[weights.size - 1 : values.size])
 
 
 def left_open_over(record: ChannelErrors, window: float, rows: NDArray[np.intp]) -> Array:
