@@ -69,6 +69,8 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
         if folder == "reproduction":
             group = folder
         item.add_marker(pytest.mark.xdist_group(group))
+    # the longest of those that are alone begin first: no worker waits for them at the end
+    items.sort(key=lambda item: item.path.name != "test_benchmarks.py")
 
 
 def richardson(function: Callable[..., float], at: Sequence[float], index: int, h: float) -> float:
