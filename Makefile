@@ -41,7 +41,7 @@ test: lint ## lint, then the quick tests
 
 test-slow: $(STAMP) ## the slow tests: pages, examples, reproduction, searches, without the JIT
 	@echo "== Slow tests"
-	@$(BIN)/pytest -n 2 --durations=40 -m slow
+	@$(BIN)/pytest -n 2 --dist loadgroup --durations=40 -m slow
 	@echo; echo "== Tests marked 'interpreted', without the JIT"
 	@SWASHPLATE_COMPILE=0 $(BIN)/pytest -n 2 -m interpreted
 # the one that differs most from what the tests before ran with

@@ -5,7 +5,8 @@ only one object ends so. A name without a dot must be that of a class: `fit` may
 """
 
 import re
-from collections.abc import Mapping
+from collections.abc import Iterable
+from functools import lru_cache
 from typing import Any
 
 from docutils import nodes
@@ -22,7 +23,7 @@ class CodeLinks(SphinxPostTransform):
 
     def run(self, **_: Any) -> None:
         """Put a link around each literal that names one object."""
-        endings = objects_by_ending(self.env.domains.python_domain.objects)
+        endings = objects_by_ending(tuple(self.env.domains.python_domain.objects.items()))
         for literal in list(self.document.findall(nodes.literal)):
             entry = endings.get(re.sub(r"\(.*\)$", "", literal.astext()))
             if entry is None or within(literal, nodes.title, nodes.reference, nodes.term):
@@ -35,10 +36,11 @@ class CodeLinks(SphinxPostTransform):
             literal.replace_self(link)
 
 
-def objects_by_ending(objects: Mapping[str, Any]) -> dict[str, tuple[str, Any]]:
+@lru_cache(maxsize=1)  # all pages ask for the same
+def objects_by_ending(objects: Iterable[tuple[str, Any]]) -> dict[str, tuple[str, Any]]:
     """Objects by each ending of their dotted names that only one of them has."""
     endings: dict[str, dict[str, Any]] = {}
-    for name, entry in objects.items():
+    for name, entry in objects:
         parts = name.split(".")
         for start in range(len(parts)):
             ending = ".".join(parts[start:])

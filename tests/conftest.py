@@ -32,6 +32,14 @@ SLOW = {"docs", "examples", "reproduction"}
 
 CRANE_FILES = {"test_crane_pages.py", "test_earlier_files.py"}
 """Files of other folders that simulate a crane."""
+ALONE = {
+    "test_benchmarks.py",
+    "test_pages.py",
+    "test_recovery.py",
+    "test_scripts.py",
+    "test_site.py",
+}
+"""Files whose slow tests have nothing in common that takes long to make."""
 
 
 def pytest_ignore_collect(collection_path: Path, config: pytest.Config) -> bool | None:
@@ -46,16 +54,23 @@ def pytest_ignore_collect(collection_path: Path, config: pytest.Config) -> bool 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """Mark what lies in a slow folder as slow, and group what needs the same kernels.
 
-    With ``--dist loadgroup`` a group is one worker's, so that no kernel is compiled twice.
+    With ``--dist loadgroup`` a group is one worker's, so that no kernel is compiled twice, and no
+    fit that several tests look at is made twice.
     """
     for item in items:
         folder, file = item.path.parent.name, item.path.name
         if folder in SLOW:
             item.add_marker(pytest.mark.slow)
+        if file in ALONE and item.get_closest_marker("slow"):
+            continue
         closes_loops = folder == "crane" or file in CRANE_FILES
         steps = folder in ("drive", "linear") or file == "test_stepping.py"
         group = "crane" if closes_loops else "steppers" if steps else file
+        if folder == "reproduction":
+            group = folder
         item.add_marker(pytest.mark.xdist_group(group))
+    # the longest of those that are alone begin first: no worker waits for them at the end
+    items.sort(key=lambda item: item.path.name != "test_benchmarks.py")
 
 
 def richardson(function: Callable[..., float], at: Sequence[float], index: int, h: float) -> float:

@@ -20,6 +20,7 @@ from tests.identification.test_own_model import NOISE, RANGES, RUNS, servo
 
 from swashplate import Campaign, DomainError, Drive, InputError, ParameterError
 from swashplate.identification import (
+    Fit,
     FitSetup,
     ModelSetup,
     Prior,
@@ -407,14 +408,18 @@ def campaign(tmp_path_factory: pytest.TempPathFactory) -> Campaign:
     return virtual(tmp_path_factory.mktemp("t"), "hoist", chosen, seed=3, perturb=0.05)
 
 
+@pytest.fixture(scope="module")
+def doubted(campaign: Campaign) -> Fit:
+    return fit(Drive.preset("hoist"), campaign, stated(**DOUBTS))
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize(("name", "deviation"), [("Z9", 0.03), ("tau", 1e-3)])
 def test_estimates_follow_a_fixed_number_as_in_a_fit_with_another(
-    campaign: Campaign, name: str, deviation: float
+    campaign: Campaign, doubted: Fit, name: str, deviation: float
 ) -> None:
     """tau acts on the card's estimates, and on the pump's by itself and through the card's."""
-    published = Drive.preset("hoist")
-    found = fit(published, campaign, stated(**DOUBTS))
+    published, found = Drive.preset("hoist"), doubted
     value = published.parameters.numbers[name]
     deviation *= value if name == "Z9" else 1.0
     step, ends = 0.5 * deviation, []

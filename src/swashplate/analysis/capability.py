@@ -52,15 +52,18 @@ def edge(holds: Callable[[Array], NDArray[np.bool_]], end: float) -> ConditionEd
     `holds` evaluates the condition for commands [V], element by element.
     """
     low, high = 0.0, end
-    if holds(np.linspace(low, high, GRID + 1)).all():
+    grid = np.linspace(low, high, GRID + 1)
+    fails = ~holds(grid)
+    if not fails.any():
         return ConditionEdge(end, None)
     while abs(high - low) > CLOSE:
-        grid = np.linspace(low, high, GRID + 1)
-        first = int(np.argmax(~holds(grid)))
+        first = int(np.argmax(fails))
         closer = float(grid[max(first - 1, 0)]), float(grid[first])
         if closer == (low, high):  # the numbers end before the width does
             break
         low, high = closer
+        grid = np.linspace(low, high, GRID + 1)
+        fails = ~holds(grid)
     return ConditionEdge(low, high)
 
 

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from typing import Literal, NamedTuple
+from weakref import WeakKeyDictionary
 
 import numpy as np
 from numpy.typing import NDArray
@@ -61,7 +62,12 @@ class Dropout(NamedTuple):
     loss: Loss
 
 
-def find_dropouts(experiment: Experiment, signal: Channel | InputSignal) -> list[Dropout]:
+_KNOWN: WeakKeyDictionary[Experiment, list[tuple[Channel | InputSignal, tuple[Dropout, ...]]]]
+_KNOWN = WeakKeyDictionary()
+"""What was found in signals of an experiment: reading, check and report each ask for it."""
+
+
+def find_dropouts(experiment: Experiment, signal: Channel | InputSignal) -> tuple[Dropout, ...]:
     """Stretches of at least six equal samples and at most 2 s that no motion explains.
 
     Notes
@@ -72,24 +78,32 @@ def find_dropouts(experiment: Experiment, signal: Channel | InputSignal) -> list
     command does not jump before. Of equal samples in a row the probability follows from how many
     there are beside the stretch: readings that rest, or whose steps are coarse, are not frozen.
     """
+    known = _KNOWN.setdefault(experiment, [])
+    for other, dropouts in known:
+        if other is signal:
+            return dropouts
+    known.append((signal, tuple(_found(experiment, signal))))
+    return known[-1][1]
+
+
+def _found(experiment: Experiment, signal: Channel | InputSignal) -> Iterator[Dropout]:
+    """See `find_dropouts`."""
     time, values = signal.time[signal.used], signal.values[signal.used]
     if signal.kind == "other" or values.size < 4 * FEWEST or np.ptp(values) == 0.0:
-        return []
+        return
     fewest = FEWEST if isinstance(signal, Channel) else FEWEST_OF_INPUT
     changes = np.flatnonzero(np.diff(values) != 0.0) + 1
     firsts, stops = np.append(0, changes), np.append(changes, values.size)
     long = stops - firsts >= fewest
     half = 0.5 * float(np.median(np.diff(time)))
     levels = np.unique(values)
-    found = list[Dropout]()
     for first, stop in zip(firsts[long].tolist(), stops[long].tolist(), strict=True):
         begin, end = float(time[first]) - half, float(time[stop - 1]) + half
         if end - begin > min(LONGEST, 0.5 * float(time[-1] - time[0])):
             continue
         loss = _loss(experiment, signal, values, levels, (first, stop), (begin, end))
         if loss is not None:
-            found.append(Dropout(begin, end, float(values[first]), loss))
-    return found
+            yield Dropout(begin, end, float(values[first]), loss)
 
 
 def _loss(

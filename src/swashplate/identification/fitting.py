@@ -313,8 +313,8 @@ def fit(
         parameters = with_estimates(smooth(nominal), problem, solution.vector)
         return Fit(setup, nominal, tuple(runs), problem, solution, parameters, starts)
 
-    def searched(setup: FitSetup, near: Mapping[str, float]) -> Fit:
-        """The optimum for a fit setup, from some values if they are given."""
+    def searched(setup: FitSetup, near: Mapping[str, float], roughly: Fit | None) -> Fit:
+        """The optimum for a fit setup, from some values or a rough fit if there are any."""
         problem = problem_of(setup, smooth(nominal), runs, threads=threads)
         refuse_unsound(check_rank("The fit", problem), InputError)
         with working("Searching") as work:
@@ -330,7 +330,10 @@ def fit(
                 limits |= {"tolerance": max(tolerance, WITH_PRIORS), "cliffs": CLIFFS}
                 start = problem.unknowns.vector_of(near) if near else None
             solver = partial(solve, loss=loss, watch=seen, keep_best=True, **limits)
-            solved = _solved(setup, problem, solver, search, doubts, start)
+            if roughly is not None and (search is None or not search.starts):
+                solved = _refined(roughly, solver)
+            else:
+                solved = _solved(setup, problem, solver, search, doubts, start)
         LOGGER.info(
             "Search: %s after %d evaluations, cost %.5g",
             solved.solution.message,
@@ -346,9 +349,11 @@ def fit(
         of it elsewhere.
         """
         problem = problem_of(setup, smooth(nominal), runs, threads=threads)
-        begin = near or problem.unknowns.values(approached(problem, loss=loss))
-        start = problem.unknowns.vector_of({**begin, **first})
-        solution = solve(problem, start, loss=loss, tolerance=ROUGH, keep_best=True)
+        solution = settled.solution if near is settled.near and not first else None
+        if solution is None:
+            begin = near or problem.unknowns.values(approached(problem, loss=loss))
+            start = problem.unknowns.vector_of({**begin, **first})
+            solution = solve(problem, start, loss=loss, tolerance=ROUGH, keep_best=True)
         if not solution.interrupted:
             problem = weighed(problem, solution.vector)
         return found(setup, _Solved(problem, solution))
@@ -357,11 +362,14 @@ def fit(
         settled = settle(runs, smooth(nominal), setup, loss=loss, threads=threads)
         runs = settled.runs
         doubts += settled.sentences
-        near, interrupted = settled.near, None
+        near, roughly = settled.near, None
         if is_whole_drive(setup, nominal):
             with working("Searching roughly"):
-                setup, near, interrupted = _asked_for(setup, nominal, near, rough)
-        result = interrupted or searched(setup, near)
+                setup, near, roughly = _asked_for(setup, nominal, near, rough)
+        if roughly is not None and roughly.interrupted:
+            result = roughly
+        else:
+            result = searched(setup, near, roughly)
     return replace(result, doubts=(*doubts, *_unlike(result)))
 
 
@@ -371,8 +379,8 @@ class _Asked(NamedTuple):
     setup: FitSetup
     near: Mapping[str, float]
     """Values near the optimum by the unknowns' labels; none if unknown."""
-    interrupted: Fit | None = None
-    """A rough fit that was interrupted."""
+    roughly: Fit | None = None
+    """A fit for this setup that ended there; one that was interrupted for an earlier one."""
 
 
 def _asked_for(
@@ -398,7 +406,7 @@ def _asked_for(
     # of a named drive, whose amplifier is known beforehand, the currents count in full
     freed = less_of_currents(fit) if is_guessed(nominal) else None
     if freed is None:
-        return _Asked(setup, fit.values)
+        return _Asked(setup, fit.values, fit)
     return _Asked(with_weight_of_currents(setup, freed.factor), freed.values)
 
 
@@ -498,6 +506,11 @@ def _solved(
         problem = weighed(problem, solution.vector)
         solution = solver(problem, solution.vector)
     return _Solved(problem, solution, solutions)
+
+
+def _refined(roughly: Fit, solver: partial[Solution]) -> _Solved:
+    """The optimum from a rough fit whose priors are weighed already."""
+    return _Solved(roughly.problem, solver(roughly.problem, roughly.solution.vector))
 
 
 def _from_starts(

@@ -5,7 +5,7 @@ All goes through the runs one by one and keeps of each a few numbers a frequency
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
 from math import sqrt
 from typing import NamedTuple
@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.fft import irfft, next_fast_len, rfft, rfftfreq
 
-from swashplate.identification.estimation.problem import LinearisedFit, LinearisedRun
+from swashplate.identification.estimation.problem import KEPT, LinearisedFit, LinearisedRun
 from swashplate.identification.estimation.unknowns import Unknowns
 from swashplate.results import Result
 
@@ -300,10 +300,29 @@ class _Spectrum:
         return np.abs(self.whitening @ scores) ** 2
 
 
-def _spectra(fit: LinearisedFit) -> Iterator[_Spectrum]:
-    """The spectrum of each run, one after another."""
-    for run, jacobian in fit.jacobians():
-        yield _Spectrum(fit, run, jacobian)
+class _Spectra:
+    """The spectrum of each run, one after another.
+
+    It is gone through twice; the first spectra are kept, as far as `KEPT` goes.
+    """
+
+    def __init__(self, fit: LinearisedFit) -> None:
+        self.fit = fit
+        self._kept = list[_Spectrum]()
+        self._left = KEPT
+
+    def __iter__(self) -> Iterator[_Spectrum]:
+        jacobians = self.fit.jacobians()
+        for number in range(len(self.fit.runs)):
+            run, jacobian = next(jacobians)
+            if number < len(self._kept):
+                yield self._kept[number]
+                continue
+            spectrum = _Spectrum(self.fit, run, jacobian)
+            if number == len(self._kept) and spectrum.derivatives.nbytes <= self._left:
+                self._kept.append(spectrum)
+                self._left -= spectrum.derivatives.nbytes
+            yield spectrum
 
 
 class _Pooled:
@@ -377,6 +396,67 @@ class _Sandwich:
         return covariance_of(self.fit, matrix, np.maximum(freedom, 1.0))
 
 
+class _SmoothedSandwich(_Sandwich):
+    """That of the smoothed spectrum of the noise."""
+
+    def __init__(self, fit: LinearisedFit, spectra: Iterable[_Spectrum]) -> None:
+        super().__init__(fit)
+        self.pooled = _pooled_spectra(fit, spectra)
+        self.shapes_and_bins = {
+            channel: iter(zip(noise.shapes, noise.bins, strict=True))
+            for channel, noise in self.pooled.items()
+        }
+        self.shared = {
+            channel: np.zeros((fit.variables.shared.size, noise.means.size))
+            for channel, noise in self.pooled.items()
+        }
+
+    def take(self, run: LinearisedRun, spectrum: _Spectrum) -> None:
+        """Add the next run."""
+        noise = self.pooled[run.channel]
+        shape, bins = next(self.shapes_and_bins[run.channel])
+        derivatives = spectrum.derivatives
+        density = spectrum.level * shape * spectrum.twice
+        middle = ((derivatives.conj() * density) @ derivatives.T).real
+        self.add(spectrum.directions, middle)
+        # contribution of a unit of the noise's shape in each bin to the variances
+        weights = spectrum.variances(derivatives) * (spectrum.level * spectrum.twice)
+        first = np.flatnonzero(np.diff(bins, prepend=-1))
+        weights, bins = np.add.reduceat(weights, first, axis=1), bins[first]
+        run_columns = self.fit.variables.of_run(run.name)
+        self.shared[run.channel][:, bins] += weights[run_columns.size :]
+        self.total[run_columns] += weights[: run_columns.size] @ noise.means[bins]
+        self.squares[run_columns] += weights[: run_columns.size] ** 2 @ noise.squares[bins]
+
+    def result(self) -> Covariance:
+        """The covariance, all runs taken."""
+        machine = self.fit.variables.shared
+        for channel, noise in self.pooled.items():
+            self.total[machine] += self.shared[channel] @ noise.means
+            self.squares[machine] += self.shared[channel] ** 2 @ noise.squares
+        return self.covariance(4.0, np.inf)
+
+
+class _BandedSandwich(_Sandwich):
+    """That of scores of bands of frequency."""
+
+    def take(self, run: LinearisedRun, spectrum: _Spectrum) -> None:
+        """Add the next run."""
+        products = spectrum.derivatives.conj() * (spectrum.twice * spectrum.residual)
+        width = min(BAND, 0.5 / spectrum.step / FEWEST_BANDS)
+        band = (spectrum.frequencies / width).astype(np.intp)
+        scores = np.add.reduceat(products, np.flatnonzero(np.diff(band, prepend=-1)), axis=1)
+        self.add(spectrum.directions, 0.5 * (scores.conj() @ scores.T).real)
+        parts = 0.5 * spectrum.variances(scores)
+        columns = self.fit.variables.columns(run.name)
+        self.total[columns] += parts.sum(axis=1)
+        self.squares[columns] += np.sum(parts**2, axis=1)
+
+    def result(self) -> Covariance:
+        """The covariance, all runs taken."""
+        return self.covariance(2.0, 1.0)
+
+
 def spectral_covariance(fit: LinearisedFit) -> Covariance:
     """Covariance of the least-squares estimate under coloured noise, from its smoothed spectrum.
 
@@ -394,7 +474,11 @@ def spectral_covariance(fit: LinearisedFit) -> Covariance:
     freedom follow from the frequencies that an unknown's variance is an average over, in bins of
     neighbours that do not overlap.
     """
-    return _covariances(fit)[0]
+    spectra = _Spectra(fit)
+    smoothed = _SmoothedSandwich(fit, spectra)
+    for run, spectrum in zip(fit.runs, spectra, strict=True):
+        smoothed.take(run, spectrum)
+    return smoothed.result()
 
 
 def band_score_covariance(fit: LinearisedFit) -> Covariance:
@@ -408,52 +492,16 @@ def band_score_covariance(fit: LinearisedFit) -> Covariance:
     at the same phase, counts in full. Degrees of freedom are those of a sum of squares, two for
     each band and run.
     """
-    return _covariances(fit)[1]
+    banded = _BandedSandwich(fit)
+    for run, spectrum in zip(fit.runs, _Spectra(fit), strict=True):
+        banded.take(run, spectrum)
+    return banded.result()
 
 
-def _covariances(fit: LinearisedFit) -> tuple[Covariance, Covariance]:
-    """Covariances by the smoothed spectrum and by scores of bands, in two passes over the runs."""
-    smoothed, banded = _Sandwich(fit), _Sandwich(fit)
-    pooled = _pooled_spectra(fit)
-    shapes_and_bins = {}
-    shared = {}
-    for channel, noise in pooled.items():
-        shapes_and_bins[channel] = iter(zip(noise.shapes, noise.bins, strict=True))
-        shared[channel] = np.zeros((fit.variables.shared.size, noise.means.size))
-    for run, spectrum in zip(fit.runs, _spectra(fit), strict=True):
-        noise = pooled[run.channel]
-        shape, bins = next(shapes_and_bins[run.channel])
-        derivatives, directions = spectrum.derivatives, spectrum.directions
-        density = spectrum.level * shape * spectrum.twice
-        smoothed.add(directions, ((derivatives.conj() * density) @ derivatives.T).real)
-        # contribution of a unit of the noise's shape in each bin to the variances
-        weights = spectrum.variances(derivatives) * (spectrum.level * spectrum.twice)
-        first = np.flatnonzero(np.diff(bins, prepend=-1))
-        weights, bins = np.add.reduceat(weights, first, axis=1), bins[first]
-        run_columns = fit.variables.of_run(run.name)
-        shared[run.channel][:, bins] += weights[run_columns.size :]
-        smoothed.total[run_columns] += weights[: run_columns.size] @ noise.means[bins]
-        smoothed.squares[run_columns] += weights[: run_columns.size] ** 2 @ noise.squares[bins]
-
-        products = derivatives.conj() * (spectrum.twice * spectrum.residual)
-        width = min(BAND, 0.5 / spectrum.step / FEWEST_BANDS)
-        band = (spectrum.frequencies / width).astype(np.intp)
-        scores = np.add.reduceat(products, np.flatnonzero(np.diff(band, prepend=-1)), axis=1)
-        banded.add(directions, 0.5 * (scores.conj() @ scores.T).real)
-        parts = 0.5 * spectrum.variances(scores)
-        columns = fit.variables.columns(run.name)
-        banded.total[columns] += parts.sum(axis=1)
-        banded.squares[columns] += np.sum(parts**2, axis=1)
-    for channel, noise in pooled.items():
-        smoothed.total[fit.variables.shared] += shared[channel] @ noise.means
-        smoothed.squares[fit.variables.shared] += shared[channel] ** 2 @ noise.squares
-    return smoothed.covariance(4.0, np.inf), banded.covariance(2.0, 1.0)
-
-
-def _pooled_spectra(fit: LinearisedFit) -> dict[str, _Pooled]:
+def _pooled_spectra(fit: LinearisedFit, spectra: Iterable[_Spectrum]) -> dict[str, _Pooled]:
     """The noise spectrum of each channel."""
     parts: dict[str, tuple[list[Array], list[Array], list[Array]]] = {}
-    for run, spectrum in zip(fit.runs, _spectra(fit), strict=True):
+    for run, spectrum in zip(fit.runs, spectra, strict=True):
         frequencies, powers, left = parts.setdefault(run.channel, ([], [], []))
         frequencies.append(spectrum.frequencies)
         powers.append(np.abs(spectrum.residual) ** 2 / (spectrum.level or 1.0))
@@ -482,8 +530,12 @@ def coloured_noise_covariance(fit: LinearisedFit) -> Covariance:
     unknown by itself: numbers whose errors make up for each other, as those of a product that alone
     is determined, would no longer do so if one were widened more than another.
     """
-    smoothed, banded = _covariances(fit)
-    return _widened(smoothed, banded)
+    spectra = _Spectra(fit)
+    smoothed, banded = _SmoothedSandwich(fit, spectra), _BandedSandwich(fit)
+    for run, spectrum in zip(fit.runs, spectra, strict=True):
+        smoothed.take(run, spectrum)
+        banded.take(run, spectrum)
+    return _widened(smoothed.result(), banded.result())
 
 
 def _widened(covariance: Covariance, other: Covariance) -> Covariance:

@@ -40,6 +40,8 @@ class Calendar(NamedTuple):
     """A way to write a date as a number."""
 
     unit: str
+    size: float
+    """Of the unit. [s]"""
     epoch: float
     """Seconds from its zero to 1970."""
     name: str
@@ -51,20 +53,27 @@ class Calendar(NamedTuple):
 
 CALENDARS = (
     # a slower log of whole numbers may be of milliseconds, microseconds, ... since a start
-    Calendar("s", 0.0, "seconds since 1970", 0.1),
-    Calendar("ms", 0.0, "milliseconds since 1970", 0.1),
-    Calendar("us", 0.0, "microseconds since 1970", 0.1),
-    Calendar("ns", 0.0, "nanoseconds since 1970", inf),
-    Calendar("s", 2_082_844_800.0, "seconds since 1904, as of LabVIEW", 0.1),
-    Calendar(_TICKS, 11_644_473_600.0, "ticks since 1601, as of FILETIME and TwinCAT", inf, True),
-    Calendar(_TICKS, 62_135_596_800.0, "ticks since the year 1, as of .NET", 0.1, True),
-    # seconds of a day, from 10:09 on, are of this size, but such a log has more than 86 kHz then
-    Calendar("d", 25_569.0 * _DAY, "days since 1899-12-30, as of Excel", 1.0, False),
+    Calendar("s", 1.0, 0.0, "seconds since 1970", 0.1),
+    Calendar("ms", 1e-3, 0.0, "milliseconds since 1970", 0.1),
+    Calendar("us", 1e-6, 0.0, "microseconds since 1970", 0.1),
+    Calendar("ns", 1e-9, 0.0, "nanoseconds since 1970", inf),
+    Calendar("s", 1.0, 2_082_844_800.0, "seconds since 1904, as of LabVIEW", 0.1),
     Calendar(
-        "microday", 25_569.0 * _DAY, "days since 1899-12-30 times 1e6, as of WinCC", 0.1, False
+        _TICKS, 1e-7, 11_644_473_600.0, "ticks since 1601, as of FILETIME and TwinCAT", inf, True
     ),
-    Calendar("d", 719_529.0 * _DAY, "days since the year 0, as MATLAB's datenum", 1.0, False),
-    Calendar("d", 2_440_587.5 * _DAY, "Julian days", 1.0, False),
+    Calendar(_TICKS, 1e-7, 62_135_596_800.0, "ticks since the year 1, as of .NET", 0.1, True),
+    # seconds of a day, from 10:09 on, are of this size, but such a log has more than 86 kHz then
+    Calendar("d", _DAY, 25_569.0 * _DAY, "days since 1899-12-30, as of Excel", 1.0, False),
+    Calendar(
+        "microday",
+        1e-6 * _DAY,
+        25_569.0 * _DAY,
+        "days since 1899-12-30 times 1e6, as of WinCC",
+        0.1,
+        False,
+    ),
+    Calendar("d", _DAY, 719_529.0 * _DAY, "days since the year 0, as MATLAB's datenum", 1.0, False),
+    Calendar("d", _DAY, 2_440_587.5 * _DAY, "Julian days", 1.0, False),
 )
 """Calendars whose numbers of the years 2000 to 2060 do not overlap, given their steps."""
 
@@ -89,10 +98,9 @@ class Stamps(NamedTuple):
 def calendar_of(stamps: Stamps) -> Calendar | None:
     """The calendar that stamps can only be of, None if they may be anything."""
     for calendar in CALENDARS:
-        size = second_of(calendar.unit, "")
         if (
-            _FROM <= size * stamps.first - calendar.epoch < _TO
-            and 0.0 < size * stamps.step <= calendar.longest_step
+            _FROM <= calendar.size * stamps.first - calendar.epoch < _TO
+            and 0.0 < calendar.size * stamps.step <= calendar.longest_step
             and calendar.is_whole in (None, stamps.are_whole)
         ):
             return calendar
@@ -111,7 +119,7 @@ def second_of_clock(unit: str, stamps: Stamps, what: str) -> float:
     """
     size = second_of(unit, what)
     calendar = calendar_of(stamps)
-    if calendar is not None and not isclose(size, second_of(calendar.unit, what), rel_tol=1e-6):
+    if calendar is not None and not isclose(size, calendar.size, rel_tol=1e-6):
         raise InputError(
             f"{what} begins at {stamps.first:.12g}, which is not in '{unit}': such numbers are "
             f'{calendar.name}; write unit = "{calendar.unit}" for it.'
@@ -122,7 +130,7 @@ def second_of_clock(unit: str, stamps: Stamps, what: str) -> float:
 def seconds_to_1970(first: float, size: float) -> float:
     """Seconds from the zero of a clock to 1970, by its first stamp and its unit of so many s."""
     for calendar in CALENDARS:
-        is_in_unit = isclose(size, second_of(calendar.unit, ""), rel_tol=1e-6)
+        is_in_unit = isclose(size, calendar.size, rel_tol=1e-6)
         if is_in_unit and _FROM <= size * first - calendar.epoch < _TO:
             return calendar.epoch
     return 0.0

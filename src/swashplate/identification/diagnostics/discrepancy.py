@@ -17,15 +17,15 @@ from typing import Literal, NamedTuple, get_args
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.fft import irfft, next_fast_len, rfft
 from scipy.ndimage import maximum_filter1d
 from scipy.optimize import nnls
-from scipy.signal import fftconvolve
 from scipy.special import stdtrit
 
 from swashplate.campaign import UNNAMED, Experiment
 from swashplate.identification.estimation.posterior import mean_square_bound
 from swashplate.identification.estimation.problem import LinearisedFit, LinearisedRun
-from swashplate.identification.optimum import Optimum
+from swashplate.identification.optimum import Optimum, once_per_fit
 from swashplate.identification.validation import RunQuality
 from swashplate.results import Result
 
@@ -293,9 +293,19 @@ def windowed(values: Array, weights: Array) -> Array:
     sums = np.full(values.size, np.nan)
     if values.size > weights.size:
         # about the first sample: a position may begin far from 0
-        from_first = fftconvolve(values - values[0], weights, "valid")
+        from_first = _convolved(values - values[0], weights)
         sums[half : values.size - half] = from_first + values[0] * weights.sum()
     return sums
+
+
+def _convolved(values: Array, weights: Array) -> Array:
+    """(n - w + 1,) sums of values (n,) times weights (w,), where these overlap entirely.
+
+    As scipy.signal.fftconvolve, whose package takes a second to load.
+    """
+    size = next_fast_len(values.size + weights.size - 1, real=True)
+    product = rfft(values, size) * rfft(weights, size)
+    return np.asarray(irfft(product, size)[weights.size - 1 : values.size])
 
 
 def left_open_over(record: ChannelErrors, window: float, rows: NDArray[np.intp]) -> Array:
@@ -614,19 +624,22 @@ def errors_of_runs(
     """
     parts = list[tuple[RunQuality, Array | None, bool]]()
     if fit is not None and channel in fit.problem.channels:
-        maneuvers = {run.name: maneuver_of(run) for run in fit.problem.experiments}
-        errors = {
-            run.name: error
-            for run, error in left_out(fit.linearised, maneuvers)
-            if run.channel == channel
-        }
+        errors = _errors_left_out(fit)
         parts += [
-            (quality, errors[quality.experiment.name], False)
+            (quality, errors[quality.experiment.name, channel], False)
             for quality in fit.qualities
             if quality.channel == channel
         ]
     parts += [(quality, None, True) for quality in predicted if quality.channel == channel]
     return ErrorsOfRuns(tuple(parts))
+
+
+@once_per_fit
+def _errors_left_out(fit: Optimum) -> dict[tuple[str, str], Array]:
+    """By run and channel the differences (n,) if the maneuver of the run had been left out."""
+    maneuvers = {run.name: maneuver_of(run) for run in fit.problem.experiments}
+    found = left_out(fit.linearised, maneuvers)
+    return {(run.name, run.channel): errors for run, errors in found}
 
 
 def variance_function(cells: Sequence[WindowCell]) -> Array:

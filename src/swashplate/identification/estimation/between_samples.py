@@ -20,7 +20,7 @@ from swashplate.identification.estimation.fit_problem import Parameters, problem
 from swashplate.identification.estimation.model import EquationModel
 from swashplate.identification.estimation.problem import Loss
 from swashplate.identification.estimation.setup import FitSetup
-from swashplate.identification.estimation.solving import approached, solve
+from swashplate.identification.estimation.solving import Solution, approached, solve
 
 WORDS: Mapping[Between, str] = {
     "linear": "a straight line between samples",
@@ -51,14 +51,21 @@ class Settled(NamedTuple):
     """On what was taken."""
     near: Mapping[str, float] = MappingProxyType({})
     """Values near the optimum, by the unknowns' labels; none if unknown."""
+    solution: Solution | None = None
+    """The optimum with these runs, if the search for the better way came to it."""
 
 
 class _Way(NamedTuple):
     """The fit in one way."""
 
-    cost: float
+    solution: Solution
     near: Mapping[str, float]
     """See `Settled`."""
+
+    @property
+    def optimum(self) -> Solution | None:
+        """See `Settled`."""
+        return self.solution if self.solution.converged else None
 
 
 def settle(
@@ -87,9 +94,11 @@ def settle(
                 f"state interpolation in [axes.{runs[0].axis}.input] if it is held.",
             ),
         )
-    better = min(ways, key=lambda between: ways[between].cost)
-    if _smaller(ways[better].cost, max(way.cost for way in ways.values())) < ALIKE:
-        return Settled(joined(runs, "linear"), near=ways["linear"].near)
+    costs = {between: way.solution.cost for between, way in ways.items()}
+    better = min(ways, key=costs.__getitem__)
+    if _smaller(costs[better], max(costs.values())) < ALIKE:
+        linear = ways["linear"]
+        return Settled(joined(runs, "linear"), near=linear.near, solution=linear.optimum)
     step = float(np.median([np.median(np.diff(run.input.time)) for run in runs]))
     other: Between = "linear" if better == "previous" else "previous"
     later = "earlier" if better == "previous" else "later"
@@ -97,7 +106,7 @@ def settle(
         f"The command is taken as {WORDS[better]}: as {WORDS[other]}, half a sample "
         f"({500.0 * step:.2g} ms) {later}, it fits worse."
     )
-    return Settled(joined(runs, better), (taken,), ways[better].near)
+    return Settled(joined(runs, better), (taken,), ways[better].near, ways[better].optimum)
 
 
 def doubt(
@@ -110,9 +119,11 @@ def doubt(
 ) -> tuple[str, ...]:
     """A sentence if the input is stated in one way, but the other fits clearly better."""
     stated = runs[0].input.interpolation
-    ways = _ways(runs, nominal, setup, loss, threads) or {stated: _Way(0.0, {})}
-    better = min(ways, key=lambda between: ways[between].cost)
-    smaller = _smaller(ways[better].cost, ways[stated].cost)
+    ways = _ways(runs, nominal, setup, loss, threads)
+    if ways is None:
+        return ()
+    better = min(ways, key=lambda between: ways[between].solution.cost)
+    smaller = _smaller(ways[better].solution.cost, ways[stated].solution.cost)
     if smaller < CLEARLY:
         return ()
     return (
@@ -149,7 +160,7 @@ def _ways(
         except DomainError:
             return None  # the fit itself says where the model does not hold
         values = problem.unknowns.values(solution.vector)
-        ways[between] = _Way(solution.cost, values)
+        ways[between] = _Way(solution, values)
         if setup.has_spreads:
             near = values
     return ways

@@ -185,6 +185,14 @@ def bounded(
     return Unknown(name, max(nominal, least), max(low, least), high, **fields)
 
 
+def _places_of(
+    names: Sequence[str], positions: Mapping[str | None, int]
+) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    """Rows of the names that have a position, and these."""
+    rows = [row for row, name in enumerate(names) if name in positions]
+    return np.array(rows, np.intp), np.array([positions[names[row]] for row in rows], np.intp)
+
+
 @dataclass(frozen=True, eq=False)
 class Unknowns(Result):
     """The unknowns of a fit in the order of the solver's vector, at a point: nominal or estimated.
@@ -369,9 +377,26 @@ class Unknowns(Result):
 
     def targets(self, vector: Array, run: str) -> dict[str, float]:
         """Values by the model's names, as one experiment sees them."""
-        numbers = sorted(self.columns(run).tolist())
+        if any(self.items[k].targets for k in self.of_run(run).tolist()):
+            return self._targets_of(vector, sorted(self.columns(run).tolist()))
+        # all runs without numbers of their own see the same
+        key = vector.tobytes()
+        found = self._last_targets.get(key)
+        if found is None:
+            found = self._targets_of(vector, self.shared.tolist())
+            self._last_targets.clear()
+            self._last_targets[key] = found
+        return dict(found)
+
+    def _targets_of(self, vector: Array, numbers: Sequence[int]) -> dict[str, float]:
+        """Values by the model's names that some unknowns set."""
         values = ((self.items[k], self.items[k].to_value(float(vector[k]))) for k in numbers)
         return {name: value for unknown, value in values for name in unknown.targets}
+
+    @cached_property
+    def _last_targets(self) -> dict[bytes, dict[str, float]]:
+        """What the machine's unknowns set at the last vector."""
+        return {}
 
     def zeros(self, vector: Array, run: str) -> dict[str, float]:
         """Free zeros of one experiment by their channels.
@@ -407,29 +432,44 @@ class Unknowns(Result):
 
     def chain(self, vector: Array, targets: Sequence[str], run: str) -> Array:
         """(len(targets), q + M) derivatives of the model's numbers by `columns` of the vector."""
-        columns = self.columns(run)
-        positions = dict[str, int]()
-        for position in np.argsort(columns).tolist():
-            positions |= dict.fromkeys(self.items[columns[position]].targets, position)
-        return self._selected(vector, columns, [positions.get(target) for target in targets])
+        key = (run, "targets", *targets)
+        if key not in self._places:
+            columns = self.columns(run)
+            positions = dict[str | None, int]()
+            for position in np.argsort(columns).tolist():
+                positions |= dict.fromkeys(self.items[columns[position]].targets, position)
+            self._places[key] = _places_of(targets, positions)
+        return self._selected(vector, run, len(targets), self._places[key])
 
     def zeros_chain(self, vector: Array, channels: Sequence[str], run: str) -> Array:
         """(len(channels), q + M) derivatives of channels' zeros by `columns` of the vector."""
-        columns = self.columns(run)
-        positions = {
-            self.items[column].channel: position for position, column in enumerate(columns)
-        }
-        return self._selected(vector, columns, [positions.get(channel) for channel in channels])
+        key = (run, "zeros", *channels)
+        if key not in self._places:
+            positions = {
+                self.items[column].channel: position
+                for position, column in enumerate(self.columns(run).tolist())
+            }
+            self._places[key] = _places_of(channels, positions)
+        return self._selected(vector, run, len(channels), self._places[key])
+
+    @cached_property
+    def _places(self) -> dict[tuple[str, ...], tuple[NDArray[np.intp], NDArray[np.intp]]]:
+        """Rows and columns of the derivatives that are not 0, by run and what is moved."""
+        return {}
 
     def _selected(
-        self, vector: Array, columns: NDArray[np.intp], positions: Sequence[int | None]
+        self,
+        vector: Array,
+        run: str,
+        size: int,
+        places: tuple[NDArray[np.intp], NDArray[np.intp]],
     ) -> Array:
-        """(len(positions), columns) slope of the unknown at its position in each row, else 0."""
+        """(size, columns of the run) slopes of unknowns at some rows and positions, else 0."""
+        columns = self.columns(run)
         slopes = np.where(self.logarithmic, self.to_values(vector), self.scales)[columns]
-        matrix = np.zeros((len(positions), columns.size))
-        for row, position in enumerate(positions):
-            if position is not None:
-                matrix[row, position] = slopes[position]
+        rows, positions = places
+        matrix = np.zeros((size, columns.size))
+        matrix[rows, positions] = slopes[positions]
         return matrix
 
     def with_worths(self, worths: Sequence[float] | None) -> Unknowns:
