@@ -51,18 +51,28 @@ def measured(drive: Drive) -> list[Experiment]:
     return runs
 
 
+NEXT_TO_NONE = 1e-9
+"""Current. [A]"""
+
+
 def fitted(
     runs: Sequence[Experiment],
     *,
     orifice_minus: bool = True,
     dead_zone_minus: tuple[float, float] | None = None,
+    behind: bool = True,
 ) -> Fit:
-    """The fit of every number of a guess; no orifice, or bounds of the dead zone in V, one way."""
+    """The fit of every number of a guess; no orifice, or bounds of the dead zone in V, one way.
+
+    Not `behind`: that no part of the dead zone lies behind a ramp is known.
+    """
     guess = guess_drive(runs)
     if dead_zone_minus is not None:
         # a search begins within its bounds
         guess = guess._replace(dead_zone=(guess.dead_zone[0], sum(dead_zone_minus) / 2.0))
     start = guessed_set(guess, "campaign.toml")
+    if not behind:
+        start = start.replace({"Z17": NEXT_TO_NONE})
     setup = whole_drive(start)
     free = dict(setup.free)
     if not orifice_minus:
@@ -100,11 +110,13 @@ def test_numbers_of_what_was_tested_hold(found: Fit) -> None:
     numbers, truth = key_numbers(found), key_numbers(with_tests(WINCH))
     assert numbers.commands == truth.commands == (8.0, 7.0)
     for number in numbers.numbers:
-        if number.name in ("jump", "creep"):  # the winch has none
-            assert abs(number.value or 0.0) < 1e-3
-            assert number.unseen or number.note == "not seen"
-            continue
         low, high = number.interval
+        if number.name in ("jump", "creep"):  # the winch has none
+            # a jump may stand for a part of the dead zone, but is not told from none
+            none = number.unseen or number.note == "not seen" or low == 0.0 or high == 0.0
+            assert none, number.label
+            assert abs(number.value or 0.0) < 0.01 * float(WINCH.steady_speed(8.0))
+            continue
         assert low is not None
         assert high is not None
         # 1.5 times the interval: twelve of them at 95 % each
@@ -150,7 +162,7 @@ def test_an_estimate_at_its_bound_keeps_its_interval_and_is_named(
     runs: list[Experiment], bounds: tuple[float, float]
 ) -> None:
     """A dead zone of 0.6 V that the search was not allowed, and what it decides."""
-    result = fitted(runs, dead_zone_minus=bounds)
+    result = fitted(runs, dead_zone_minus=bounds, behind=False)
     assert "V_dz_minus" in identifiability_of(result).at_bounds
     numbers = key_numbers(result)
     for number in numbers.numbers:
@@ -168,8 +180,11 @@ def test_an_estimate_at_its_bound_keeps_its_interval_and_is_named(
 
 
 @pytest.mark.slow
-def test_a_dead_zone_is_known_beside_a_jump_that_makes_up_for_it_at_first(found: Fit) -> None:
+def test_a_dead_zone_is_known_beside_a_jump_that_makes_up_for_it_at_first(
+    runs: list[Experiment],
+) -> None:
     """A profile ends where no derivative says so, and the dead zone's spread is the profile's."""
+    found = fitted(runs, behind=False)
 
     def dead_zones(drive: Drive) -> np.ndarray:
         return np.array([drive.parameters.numbers[f"V_dz_{way}"] for way in WAYS])
