@@ -3,10 +3,10 @@
 Each is a value; `|` combines them: ``TipShaper("zv") | DelayedFeedback(0.2) | Clip()``. In the
 loop they act in one order, whatever order they are written in: path of the tip, tip shaper, offsets
 of the tip (feedback, ship, user-defined), clip, inverse kinematics, position loop. Every stage
-works on the path of the tip, except `Crew`, whose hand is at the joysticks, before all other stages.
-A stage of the tip brings a position loop of 0.7 /s with it, by which the shafts
-follow that path; `PositionLoop` sets another gain. `Sensors` says how well control sees the crane;
-without sensors it sees the true signals. The linear crane, `linearize`, is for controllers that are
+works on the path of the tip, and brings a position loop of 0.7 /s with it, by which the shafts
+follow that path; `PositionLoop` sets another gain. A `Crew` is no such stage: its hand is at the
+joysticks, before all others. `Sensors` says how well control sees the crane; without sensors it
+sees the true signals. The linear crane, `linearize`, is for controllers that are
 designed outside the package.
 """
 

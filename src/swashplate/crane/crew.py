@@ -67,7 +67,7 @@ class CrewMemory(NamedTuple):
     state: Array
     """(3, 2), rows `HANG`, `HAND` and `COMMANDED`."""
     wanted: Array
-    """(2, n) speeds of the tip that are on their way from eye to hand; n is a power of two. [m/s]"""
+    """(2, n) speeds of the tip on their way from eye to hand, n a power of two. [m/s]"""
 
 
 def new_memory(delay: int) -> CrewMemory:

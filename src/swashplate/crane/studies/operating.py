@@ -5,7 +5,8 @@ its cells and each heading the frequency domain gives what is linear: the crane 
 with control as long as no drive is at a limit. A cell is simulated if that is near a limit, or asks
 of a drive what it cannot do, and judged as a verdict is. At one period and heading, what is beyond
 a limit stays beyond it in higher waves, so that only the boundary is looked for, and what limits
-first, as the sea rises, is what limits all seas above.
+first, as the sea rises, is what limits all seas above. A crew does not answer small swing, so that
+no cell is workable with it by the frequency domain alone.
 """
 
 from __future__ import annotations
@@ -45,6 +46,7 @@ from swashplate.crane.studies.spectral import DEMANDS, linear_response
 from swashplate.crane.studies.study import (
     BUILT,
     CALM,
+    CREW_ASSUMED,
     CREW_NOT_MODELLED,
     IDEAL,
     NO_CONTROL,
@@ -134,6 +136,8 @@ class Operability(Tabular):
     """Ship, peak factor, spreading."""
     case: str
     """Sentences on pose and control of the crane, and on the simulation of cells."""
+    crewed: bool
+    """Whether a crew is among the variants."""
     hoist_limit: tuple[float, float, float]
     """Least significant height at which the hoist is too slow for the hook, with period and
     heading; inf if none. [m], [s], [deg]"""
@@ -246,7 +250,9 @@ class Operability(Tabular):
                 "value holds its limit, or control sometimes fails to take over the swing that it "
                 "is switched on in."
             )
-        if self._lowest_unworkable() <= CALM:
+        if self.crewed:
+            sentences.append(CREW_ASSUMED)
+        elif self._lowest_unworkable() <= CALM:
             sentences.append(CREW_NOT_MODELLED)
         return (*sentences, *assumed_sentences(self.crane))
 
@@ -352,6 +358,7 @@ def operability(
         cells=ordered,
         seaway=base,
         case=case,
+        crewed=study.crewed,
         hoist_limit=hoist,
     )
 
@@ -470,6 +477,8 @@ def _linear(case: Case, sea: Seaway, limits: Mapping[str, float]) -> _Linear:
         return _Linear(slope, mean, 0.0, known)
     demands = [name for name in DEMANDS if name in values and (case.driven or name == "clip")]
     demand = max((values[name].largest for name in demands), default=0.0)
+    if stages_of(control).settings.crew.gain > 0.0:  # its threshold is not linear in any waves
+        demand = np.inf
     return _Linear(slope, mean, max(demand, _demand_at_start(case, sea)) / LOW_SEA, known)
 
 
