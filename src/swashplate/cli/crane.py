@@ -137,8 +137,8 @@ def run(
                 "also called identified), volts or ideal. Control: zv-tip, zvd-tip, ei-tip, "
                 "feedback=GAIN/DELAY, ship, clip=M, loop=GAIN, sensors=NOISE_DEG/DELAY/RATE "
                 "(noise of the rope's angle, seconds, Hz), joined by +; or "
-                "crew=DELAY/THRESHOLD_DEG/GAIN, an operator who damps by hand (seconds, swing, "
-                "1/s). May be repeated."
+                "crew=DELAY/THRESHOLD_DEG/GAIN/SHARE, an operator who damps by hand (seconds, "
+                "swing, 1/s, part of what slew and luff can follow). May be repeated."
             ),
         ),
     ] = None,

@@ -431,7 +431,7 @@ def control_of(text: str) -> Control | None:
         "clip": (control.Clip, 1),
         "loop": (control.PositionLoop, 1),
         "sensors": (_sensors, 3),
-        "crew": (control.Crew, 3),
+        "crew": (control.Crew, 4),
     }
     for shape in control.IMPULSES:
         kinds[f"{shape}-tip"] = (partial(control.TipShaper, shape), 0)
@@ -446,7 +446,7 @@ def control_of(text: str) -> Control | None:
             raise InputError(
                 f"There is no control '{stage}'; there are zv-tip (zvd, ei), "
                 "feedback=0.2/0.25, ship, clip=0.25, loop=0.7, sensors=0.1/0.05/50 and "
-                "crew=0.3/0.5/0.3."
+                "crew=0.3/0.5/0.3/0.8."
             )
         stages.append(kind(*numbers))
     return control.Chain(tuple(stages)) if stages else None

@@ -57,9 +57,9 @@ HUMAN = (
     ("delay", 0.0, 10.0),
     ("threshold_deg", 0.0, 30.0),
     ("gain", 0.001, 10.0),
+    ("share", 0.001, 10.0),
     ("lag", 0.01, 10.0),
     ("return_time", 1.0, 1000.0),
-    ("share", 0.001, 10.0),
 )
 """Plausible ranges of the numbers of a crew."""
 GIVES = ("tip_x", "tip_y")
@@ -357,7 +357,7 @@ class Crew(Control):
     --------
     >>> from swashplate.crane import control
     >>> control.Crew(delay=0.4).description()
-    'a crew that is 0.4 s late and sees swing from 0.5 deg on'
+    'a crew that is 0.4 s late, sees swing from 0.5 deg on, and answers it with 0.3 /s, at ...'
     """
 
     delay: float = 0.3
@@ -366,21 +366,20 @@ class Crew(Control):
     """Swing that the operator does not answer, at most 30; assumed. [deg]"""
     gain: float = 0.3
     """Speed of the tip for each metre of swing, at most 10; assumed. [1/s]"""
+    share: float = 0.8
+    """Part that is used of the speed min(v, a/ω₀) that slew and luff can follow at the load's
+    period, as of somebody who knows this crane, at most 10; assumed. 10 is the stick's whole travel
+    on most cranes."""
     lag: float = 0.1
     """Time constant of arm and hand, 0.01 to 10; assumed. [s]"""
     return_time: float = 30.0
     """Time constant with which the operator brings the tip back to the place that the command gives
     it, and takes what hangs out for rest, 1 to 1000; assumed. [s]"""
-    share: float | None = 0.8
-    """Part that is used of the speed that slew and luff can follow at the load's period, as of
-    somebody who knows this crane, at most 10; assumed. None: the stick's whole travel."""
     kind = "crew"
 
     def __post_init__(self) -> None:
         for name, least, most in HUMAN:
             value = getattr(self, name)
-            if name == "share" and value is None:
-                continue
             if not (isinstance(value, Real) and least <= float(value) <= most):
                 raise InputError(
                     f"The {name} of a crew is {value!r}, but must be a number from {least:g} to "
@@ -388,11 +387,11 @@ class Crew(Control):
                 )
 
     def description(self) -> str:
-        """Its delay and threshold."""
-        knows = "" if self.share is not None else ", and uses the stick's whole travel"
+        """Its delay, threshold, gain and share."""
         return (
-            f"a crew that is {self.delay:g} s late and sees swing from {self.threshold_deg:g} deg "
-            f"on{knows}"
+            f"a crew that is {self.delay:g} s late, sees swing from {self.threshold_deg:g} deg on, "
+            f"and answers it with {self.gain:g} /s, at {self.share:g} of what slew and luff can "
+            "follow"
         )
 
     def operator(self) -> HumanOperator:
@@ -400,10 +399,10 @@ class Crew(Control):
         return HumanOperator(
             gain=float(self.gain),
             delay=round(self.delay * RATE),
-            lag=float(self.lag),
             threshold=radians(self.threshold_deg),
+            share=float(self.share),
+            lag=float(self.lag),
             return_time=float(self.return_time),
-            share=0.0 if self.share is None else float(self.share),
         )
 
 

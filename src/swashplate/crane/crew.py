@@ -41,14 +41,14 @@ class HumanOperator(NamedTuple):
     """Speed of the tip for each metre of swing; 0 without a crew. [1/s]"""
     delay: int = 0
     """[samples of the loop]"""
-    lag: float = 0.1
-    """[s]"""
     threshold: float = 0.0
     """[rad]"""
+    share: float = 1.0
+    """Of what the drives can follow."""
+    lag: float = 0.1
+    """[s]"""
     return_time: float = 30.0
     """[s]"""
-    share: float = 0.0
-    """Of what the drives can follow; no limit but theirs if it is 0."""
 
 
 class Drivable(NamedTuple):
@@ -128,10 +128,9 @@ def catch_swing(
         away = arm * (shafts[i] - state[COMMANDED, i])
         speed = operator.gain * out - away / operator.return_time
         drive = drives[i]
-        if operator.share > 0.0:
-            full = abs(arm) * min(drive.high, -drive.low)
-            most = followable_speed(full, abs(arm) * drive.acceleration, omega)
-            speed = min(max(speed, -operator.share * most), operator.share * most)
+        full = abs(arm) * min(drive.high, -drive.low)
+        most = operator.share * followable_speed(full, abs(arm) * drive.acceleration, omega)
+        speed = min(max(speed, -most), most)
         memory.wanted[i, sample & last] = speed
         late = memory.wanted[i, (sample - operator.delay) & last]
         state[HAND, i] += h / operator.lag * (late - state[HAND, i])

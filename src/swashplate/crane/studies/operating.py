@@ -433,9 +433,13 @@ class _Linear(NamedTuple):
     """Largest part for each metre of what drives and clip can do that control asks for."""
     limits: Mapping[str, float]
     """Of quantities that the frequency domain has."""
+    idle: _Idle | None = None
+    """Waves in which the crew has nothing to do."""
 
     def ratio(self, height: float) -> float:
         """Largest ratio of a value to its limit in waves of a height."""
+        if self.idle is not None and height < self.idle.height:
+            return self.idle.without.ratio(height)
         ratios = [
             (self.mean[name] + height * self.slope[name]) / limit
             for name, limit in self.limits.items()
@@ -455,6 +459,8 @@ class _Linear(NamedTuple):
 
     def decision(self, height: float) -> Decision:
         """Whether the crane works; not decided if too near a limit, of a drive as well."""
+        if self.idle is not None and height < self.idle.height:
+            return self.idle.without.decision(height)
         ratio = self.ratio(height)
         if self.demand == 0.0:  # no drive moves
             return "no" if ratio > 1.0 else "yes"
@@ -464,21 +470,34 @@ class _Linear(NamedTuple):
         return "yes" if far else "not decided"
 
 
+class _Idle(NamedTuple):
+    """Waves so low that a crew sees no swing and does nothing."""
+
+    height: float
+    """[m]"""
+    without: _Linear
+    """The crane without the crew."""
+
+
 def _linear(case: Case, sea: Seaway, limits: Mapping[str, float]) -> _Linear:
     """The first of a case's cranes in a sea of `LOW_SEA`, in the frequency domain."""
     control = case.options["control"]
     response = linear_response(case.cranes[0], sea, control, **case.pose, **case.hangs)
     values = response.values
     known = {name: limit for name, limit in limits.items() if name in values}
-    named = {*known, "hoist_demand"}
+    named = {*known, "hoist_demand", "off_lead", "side_lead"}
     mean = {name: abs(values[name].mean) for name in named}
     slope = {name: (values[name].largest - mean[name]) / LOW_SEA for name in named}
     if control is None:
         return _Linear(slope, mean, 0.0, known)
     demands = [name for name in DEMANDS if name in values and (case.driven or name == "clip")]
     demand = max((values[name].largest for name in demands), default=0.0)
-    if stages_of(control).settings.crew.gain > 0.0:  # its threshold is not linear in any waves
-        demand = np.inf
+    operator = stages_of(control).settings.crew
+    if operator.gain > 0.0:  # not linear in any waves in which it sees the swing
+        without = _linear(case.changed(control=None), sea, limits)
+        seen = max(without.slope["off_lead"], without.slope["side_lead"])
+        idle = _Idle(operator.threshold / NEAR / seen if seen > 0.0 else np.inf, without)
+        return _Linear(slope, mean, np.inf, known, idle)
     return _Linear(slope, mean, max(demand, _demand_at_start(case, sea)) / LOW_SEA, known)
 
 
