@@ -181,6 +181,7 @@ CREWS = (
     "crew=0.3/0.5/0.3/10",
 )
 CALM = Spectrum(0.1, 10.4)
+CREWS_IN_CALM = ("crew", "crew=0.5", "crew=1", "crew=0.3/1", "crew=0.3/0.5/0.3/10")
 
 
 def controllers(seaways: int, words_of_laws: tuple[str, ...], sea: str | Spectrum) -> None:
@@ -206,11 +207,13 @@ def controllers(seaways: int, words_of_laws: tuple[str, ...], sea: str | Spectru
         left = sum(assessed.departures(name).values())
         worse = "" if name == "no control" else f"{assessed.share_worse(name).value:.0%}"
         limited = {each.name: each.largest.value for each in assessed.limited(name)}
+        largest = f"{np.degrees(limited['swing']):.1f}° | {limited['placement']:.2f} m"
+        if np.isnan(limited["swing"]):
+            largest = "– | –"
         rms = "–" if np.isnan(swing[0]) else f"{swing[0]:.2f}°"
         gone = f" ({left} left)" if left else ""
         print(
-            f"| {words} | {rms}{gone} | {worse} | {np.degrees(limited['swing']):.1f}° | "
-            f"{limited['placement']:.2f} m | {limited['saturation']:.0%} |",
+            f"| {words} | {rms}{gone} | {worse} | {largest} | {limited['saturation']:.0%} |",
             flush=True,
         )
 
@@ -235,7 +238,7 @@ def main() -> None:
         controllers(given.seaways, CONTROLLERS, "ss3")
     elif given.what == "crews":
         controllers(given.seaways, CREWS, "ss3")
-        controllers(given.seaways, CREWS, CALM)
+        controllers(given.seaways, CREWS_IN_CALM, CALM)
     else:
         spectrum()
 
