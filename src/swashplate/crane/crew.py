@@ -61,6 +61,21 @@ class Drivable(NamedTuple):
     """[rad/s²]"""
 
 
+class View(NamedTuple):
+    """What the operator sees, each across the boom and along it, of slew and luff."""
+
+    swing: tuple[float, float]
+    """Load less tip. [m]"""
+    plumb: tuple[float, float]
+    """The same of a load at rest. [m]"""
+    rope: float
+    """[m]"""
+    shafts: tuple[float, float]
+    """[rad]"""
+    arms: tuple[float, float]
+    """Metres of the tip for each radian of the shaft."""
+
+
 class CrewMemory(NamedTuple):
     """State of a crew, which the loop changes."""
 
@@ -88,51 +103,59 @@ def followable_speed(speed: float, acceleration: float, omega: float) -> float:
 
 
 @inlined
-def catch_swing(
-    reference: Array,
-    swing: Vector,
-    plumb: Vector,
+def boomwise(v: Vector, bearing: tuple[float, float]) -> tuple[float, float]:
+    """Components across the boom, to starboard of one that points forward, and along it."""
+    c, s = bearing
+    return -v.x * s - v.y * c, v.x * c - v.y * s
+
+
+@inlined
+def view_of(
+    hangs: tuple[Vector, Vector],
     rope: float,
     bearing: tuple[float, float],
     boom: Boom,
     shafts: tuple[float, float],
+    g: Geometry,
+) -> View:
+    """View from the cab, which rolls with the ship.
+
+    Load less tip as it hangs, and as it would at rest, in the ship's axes [m]; cosine and sine of
+    the slew; angles of the shafts of slew and luff [rad].
+    """
+    # metres of the tip for each radian of the shaft: boom up is inwards
+    arms = (g.foot + g.boom * boom.cos, -reach_rate(boom, g))
+    return View(boomwise(hangs[0], bearing), boomwise(hangs[1], bearing), rope, shafts, arms)
+
+
+@inlined
+def catch_swing(
+    reference: Array,
+    view: View,
     drives: tuple[Drivable, Drivable],
     memory: CrewMemory,
     operator: HumanOperator,
     sample: int,
     h: float,
-    g: Geometry,
 ) -> None:
-    """Add what the crew asks of slew and luff to the command's reference speeds. [rad/s]
-
-    `swing` is load less tip in the ship's axes, as it is seen from a cab that rolls with the ship,
-    `plumb` a load at rest [m]; `bearing` is cosine and sine of the slew, `shafts` are angles of
-    slew and luff [rad], `drives` their limits.
-    """
+    """Add what the crew asks of slew and luff to the command's reference speeds. [rad/s]"""
     state = memory.state
-    c, s = bearing
-    reach = g.foot + g.boom * boom.cos
-    rate = reach_rate(boom, g)
-    omega = sqrt(GRAVITY / rope)
+    omega = sqrt(GRAVITY / view.rope)
     last = memory.wanted.shape[1] - 1
     for i in range(2):
-        # metres of the tip for each radian of the shaft: boom up is inwards
-        arm = reach if i == 0 else -rate
-        seen = -swing.x * s - swing.y * c if i == 0 else swing.x * c - swing.y * s
         if sample == 0:
-            state[HANG, i] = -plumb.x * s - plumb.y * c if i == 0 else plumb.x * c - plumb.y * s
+            state[HANG, i] = view.plumb[i]
         else:
             state[COMMANDED, i] += h * reference[i + 1]
-        state[HANG, i] += h / operator.return_time * (seen - state[HANG, i])
-        out = beyond_threshold(seen - state[HANG, i], operator.threshold * rope)
-        away = arm * (shafts[i] - state[COMMANDED, i])
+        state[HANG, i] += h / operator.return_time * (view.swing[i] - state[HANG, i])
+        out = beyond_threshold(view.swing[i] - state[HANG, i], operator.threshold * view.rope)
+        away = view.arms[i] * (view.shafts[i] - state[COMMANDED, i])
         speed = operator.gain * out - away / operator.return_time
-        drive = drives[i]
-        full = abs(arm) * min(drive.high, -drive.low)
-        most = operator.share * followable_speed(full, abs(arm) * drive.acceleration, omega)
-        speed = min(max(speed, -most), most)
-        memory.wanted[i, sample & last] = speed
+        arm = abs(view.arms[i])
+        full = arm * min(drives[i].high, -drives[i].low)
+        most = operator.share * followable_speed(full, arm * drives[i].acceleration, omega)
+        memory.wanted[i, sample & last] = min(max(speed, -most), most)
         late = memory.wanted[i, (sample - operator.delay) & last]
         state[HAND, i] += h / operator.lag * (late - state[HAND, i])
-        asked = reference[i + 1] + state[HAND, i] / arm
-        reference[i + 1] = min(max(asked, drive.low), drive.high)
+        asked = reference[i + 1] + state[HAND, i] / view.arms[i]
+        reference[i + 1] = min(max(asked, drives[i].low), drives[i].high)

@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 
 from swashplate.crane.closed_loop.signals import ABSENT, LOAD, PULL, SHAFT, SPEED, TIP, Columns
 from swashplate.crane.control import SEEN, Sensing, Settings
-from swashplate.crane.crew import CrewMemory, Drivable, catch_swing
+from swashplate.crane.crew import CrewMemory, Drivable, catch_swing, view_of
 from swashplate.crane.kinematics import (
     Boom,
     Geometry,
@@ -527,21 +527,16 @@ def advance_crane(
             reference[i] = limited(stick[m, i], inverses[i])
         if settings.crew.gain > 0.0:
             slew = home.slew + shafts.slew
-            catch_swing(
-                reference,
-                to_ship(r, add_scaled(hung.hook, -1.0, tip)),
-                to_ship(r, Vector(0.0, 0.0, -rope)),
+            swing = add_scaled(hung.hook, -1.0, tip)
+            view = view_of(
+                (to_ship(r, swing), to_ship(r, Vector(0.0, 0.0, -rope))),
                 rope,
                 (cos(slew), sin(slew)),
                 boom,
                 (shafts.slew, shafts.luff),
-                drivable,
-                arrays.crew,
-                settings.crew,
-                sample,
-                h,
                 g,
             )
+            catch_swing(reference, view, drivable, arrays.crew, settings.crew, sample, h)
         if settings.path:
             # 1. what control sees
             swing = add_scaled(hung.hook, -1.0, tip)
