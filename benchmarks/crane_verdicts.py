@@ -4,6 +4,7 @@
     .venv/bin/python benchmarks/crane_verdicts.py borders [--cells 10]
     .venv/bin/python benchmarks/crane_verdicts.py spectrum
     .venv/bin/python benchmarks/crane_verdicts.py controllers [--seaways 80]
+    .venv/bin/python benchmarks/crane_verdicts.py crews [--seaways 80]
 
 stability: the verdicts of sets of other seaways, which count for 10 min, 20 min and hours.
 borders: cells of the made-up year near a limit, drawn at random, against the verdict in other
@@ -11,6 +12,7 @@ seaways.
 spectrum: swing without control by simulation over that by its spectrum, for ships, headings and
 damping ratios; small waves, so that the crane is linear.
 controllers: those that the package has, on the packaged crane's own drives in sea state 3 abeam.
+crews: operators who damp by hand, there and in a calm sea of the load's own period.
 """
 
 from __future__ import annotations
@@ -166,17 +168,35 @@ CONTROLLERS = (
 """As the command line takes them."""
 
 
-def controllers(seaways: int) -> None:
+CREWS = (
+    "crew",
+    "crew=0.2",
+    "crew=0.5",
+    "crew=1",
+    "crew=0.3/0.25",
+    "crew=0.3/1",
+    "crew=0.3/0.5/0.15",
+    "crew=0.3/0.5/0.6",
+    "crew=0.3/0.5/0.3/0.5",
+    "crew=0.3/0.5/0.3/10",
+)
+CALM = Spectrum(0.1, 10.4)
+CREWS_IN_CALM = ("crew", "crew=0.5", "crew=1", "crew=0.3/1", "crew=0.3/0.5/0.3/10")
+
+
+def controllers(seaways: int, words_of_laws: tuple[str, ...], sea: str | Spectrum) -> None:
     """Print a row for each controller, as a table of Markdown."""
-    laws = {words: control_of(words) for words in CONTROLLERS}
+    laws = {words: control_of(words) for words in words_of_laws}
     assessed = assess(
         Crane.preset("tg3637"),
         laws,
         seeds=range(seaways),
+        sea=sea,
         drives=("identified",),
         remedies=False,
         tipping_points=False,
     )
+    print(f"{sea}\n")
     print(
         "| `--control` | swing, RMS | worse than none | largest swing in 3 h | place | saturation |"
     )
@@ -187,11 +207,13 @@ def controllers(seaways: int) -> None:
         left = sum(assessed.departures(name).values())
         worse = "" if name == "no control" else f"{assessed.share_worse(name).value:.0%}"
         limited = {each.name: each.largest.value for each in assessed.limited(name)}
+        largest = f"{np.degrees(limited['swing']):.1f}° | {limited['placement']:.2f} m"
+        if np.isnan(limited["swing"]):
+            largest = "– | –"
         rms = "–" if np.isnan(swing[0]) else f"{swing[0]:.2f}°"
         gone = f" ({left} left)" if left else ""
         print(
-            f"| {words} | {rms}{gone} | {worse} | {np.degrees(limited['swing']):.0f}° | "
-            f"{limited['placement']:.1f} m | {limited['saturation']:.0%} |",
+            f"| {words} | {rms}{gone} | {worse} | {largest} | {limited['saturation']:.0%} |",
             flush=True,
         )
 
@@ -201,7 +223,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
-    kinds = ("stability", "borders", "spectrum", "controllers")
+    kinds = ("stability", "borders", "spectrum", "controllers", "crews")
     parser.add_argument("what", choices=kinds)
     parser.add_argument("--seaways", type=int, default=80)
     parser.add_argument("--sets", type=int, default=10)
@@ -213,7 +235,10 @@ def main() -> None:
     elif given.what == "borders":
         borders(given.cells)
     elif given.what == "controllers":
-        controllers(given.seaways)
+        controllers(given.seaways, CONTROLLERS, "ss3")
+    elif given.what == "crews":
+        controllers(given.seaways, CREWS, "ss3")
+        controllers(given.seaways, CREWS_IN_CALM, CALM)
     else:
         spectrum()
 

@@ -39,6 +39,10 @@ FIGURES = {
         "crane operability tg3637 --control feedback=0.2/0.2+ship+clip "
         "--plot crane-operability.png",
     ),
+    "crane-operability-crew.png": (
+        "crane operability tg3637 --crew --drives identified --headings 90 "
+        "--control feedback=0.2/0.2+ship+clip --plot crane-operability-crew.png",
+    ),
     "crane-follow.png": ("crane follow tg3637 --plot crane-follow.png",),
     "encoder.png": (
         "rig hoist --out virtual",

@@ -236,6 +236,8 @@ def test_follow_and_a_sweep_print_their_tables(tmp_path):
         ("run tg3637 --variant ideal:magic", "There is no control 'magic'; there are zv-tip"),
         ("run tg3637 --variant ideal:sensors=0.1/9", "delay of sensors is 9.0, but must be"),
         ("run tg3637 --variant ideal:sensors=1/2/3/4", "There is no control 'sensors=1/2/3/4'"),
+        ("run tg3637 --variant ideal:crew=20", "delay of a crew is 20.0, but must be"),
+        ("run tg3637 --variant ideal:crew=1/2/3/4/5", "There is no control 'crew=1/2/3/4/5'"),
         ("assess tg3637 --sea ss3 --sea ss2", "--sea ss3 --sea ss2: give one sea"),
         ("run tg3637 --variant direct", "With direct actuation commands are voltages"),
         ("run tg3637 --drive luff=none", "or the result or folder of a fit, but there is no such"),

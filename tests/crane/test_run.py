@@ -271,6 +271,18 @@ def test_stepper_takes_the_samples_of_a_run(crane):
     same_by_steps(crane, command, ship, control=controller)
 
 
+@pytest.mark.interpreted
+def test_stepper_takes_the_samples_of_a_run_with_a_crew(crane):
+    command = OperatorCommand.trapezoid(
+        slew=-0.8, luff=0.5, duration=1.0, start=0.1, ramp=0.2, length=1.5
+    )
+    crew = control.Crew(delay=0.1, threshold_deg=0.01)
+    ship = Seaway("ss3", seed=1).motion(769)
+    run = same_by_steps(crane, command, ship, control=crew | TIP)
+    alone = simulate(crane, command, sea=ship, control=TIP)
+    assert np.abs(run.tip - alone.tip).max() > 0.0
+
+
 @pytest.mark.slow
 def test_drives_in_the_loop_are_those_that_are_simulated_alone(crane, slewed):
     run = simulate(crane, slewed, control=TIP, brake=False)

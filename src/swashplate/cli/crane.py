@@ -136,7 +136,9 @@ def run(
                 "Command of the drives and, after a colon, control. Drives: inverse (the default, "
                 "also called identified), volts or ideal. Control: zv-tip, zvd-tip, ei-tip, "
                 "feedback=GAIN/DELAY, ship, clip=M, loop=GAIN, sensors=NOISE_DEG/DELAY/RATE "
-                "(noise of the rope's angle, seconds, Hz), joined by +. May be repeated."
+                "(noise of the rope's angle, seconds, Hz), joined by +; or "
+                "crew=DELAY/THRESHOLD_DEG/GAIN/SHARE, an operator who damps by hand (seconds, "
+                "swing, 1/s, part of what slew and luff can follow). May be repeated."
             ),
         ),
     ] = None,

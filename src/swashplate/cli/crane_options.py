@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 
 import typer
 
-from swashplate.cli.options import force_option
+from swashplate.cli.options import NO_VALUE, force_option
 from swashplate.cli.parsing import pairs_of
 from swashplate.cli.terminal import long_work, side
 from swashplate.errors import InputError
@@ -319,6 +319,17 @@ class Studied(Operated):
             ),
         ),
     ] = None
+    crew: Annotated[
+        bool,
+        typer.Option(
+            "--crew",
+            metavar=NO_VALUE,
+            help=(
+                "Add a variant in which the operator damps the swing by hand, on the crane's own "
+                "drives."
+            ),
+        ),
+    ] = False
     scale: Annotated[
         list[str] | None,
         typer.Option(
@@ -332,6 +343,8 @@ class Studied(Operated):
 
     def through(self, study: Callable[..., Any], *arguments: Any, **keywords: Any) -> Any:
         """Run a study with the controller and the options, and show its progress."""
+        from swashplate.crane.control import Crew
+
         controller = control_of(self.control)
         if controller is None:
             raise InputError("--control is empty: there is nothing to assess.")
@@ -342,6 +355,8 @@ class Studied(Operated):
             options["sea"] = self.waters
         if self.seeds is not None:
             options["seeds"] = range(self.seeds)
+        if self.crew:
+            options["crew"] = Crew()
         if self.drives is not None or self.scale:
             options["drives"] = self.drive_sets()
         with long_work("Seaways") as show:
@@ -416,6 +431,7 @@ def control_of(text: str) -> Control | None:
         "clip": (control.Clip, 1),
         "loop": (control.PositionLoop, 1),
         "sensors": (_sensors, 3),
+        "crew": (control.Crew, 4),
     }
     for shape in control.IMPULSES:
         kinds[f"{shape}-tip"] = (partial(control.TipShaper, shape), 0)
@@ -429,7 +445,8 @@ def control_of(text: str) -> Control | None:
         if kind is None or len(numbers) > most_numbers:
             raise InputError(
                 f"There is no control '{stage}'; there are zv-tip (zvd, ei), "
-                "feedback=0.2/0.25, ship, clip=0.25, loop=0.7 and sensors=0.1/0.05/50."
+                "feedback=0.2/0.25, ship, clip=0.25, loop=0.7, sensors=0.1/0.05/50 and "
+                "crew=0.3/0.5/0.3/0.8."
             )
         stages.append(kind(*numbers))
     return control.Chain(tuple(stages)) if stages else None

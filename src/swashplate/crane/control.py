@@ -3,9 +3,10 @@
 Each is a value; `|` combines them: ``TipShaper("zv") | DelayedFeedback(0.2) | Clip()``. In the
 loop they act in one order, whatever order they are written in: path of the tip, tip shaper, offsets
 of the tip (feedback, ship, user-defined), clip, inverse kinematics, position loop. Every stage
-works on the path of the tip. It brings a position loop of 0.7 /s with it, by which the shafts
-follow that path; `PositionLoop` sets another gain. `Sensors` says how well control sees the crane;
-without sensors it sees the true signals. The linear crane, `linearize`, is for controllers that are
+works on the path of the tip, and brings a position loop of 0.7 /s with it, by which the shafts
+follow that path; `PositionLoop` sets another gain. A `Crew` is no such stage: its hand is at the
+joysticks, before all others. `Sensors` says how well control sees the crane; without sensors it
+sees the true signals. The linear crane, `linearize`, is for controllers that are
 designed outside the package.
 """
 
@@ -21,6 +22,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from swashplate.crane.axes import RATE
+from swashplate.crane.crew import HumanOperator
 from swashplate.errors import InputError
 from swashplate.machine import Model
 
@@ -51,6 +53,15 @@ SENSED = (
     ("rate", 1.0, RATE),
 )
 """Plausible ranges of the numbers of sensors."""
+HUMAN = (
+    ("delay", 0.0, 10.0),
+    ("threshold_deg", 0.0, 30.0),
+    ("gain", 0.001, 10.0),
+    ("share", 0.001, 10.0),
+    ("lag", 0.01, 10.0),
+    ("return_time", 1.0, 1000.0),
+)
+"""Plausible ranges of the numbers of a crew."""
 GIVES = ("tip_x", "tip_y")
 """Signals of a user-defined controller: what it adds to the reference tip, ship's frame. [m]"""
 
@@ -82,6 +93,7 @@ class Settings(NamedTuple):
     """[m]; 0: from the limits, by `share`; no clip if that is 0, too."""
     share: float = 0.0
     sensing: Sensing = Sensing()
+    crew: HumanOperator = HumanOperator()
 
 
 class Control:
@@ -328,6 +340,73 @@ class Sensors(Control):
 
 
 @dataclass(frozen=True)
+class Crew(Control):
+    """An operator who damps the swing by hand: drives the tip over the load as it swings out.
+
+    The hand is at the joysticks, in addition to the command; it cannot move the tip faster than the
+    drives. The operator sees the swing from a cab that rolls with the ship, knows nothing of the
+    ship's motion, and sees without `Sensors`. `swashplate.crane.crew` has the equations.
+
+    No number was measured on a crane's operator: all are assumed. Delay and lag are like those of
+    people at a joystick who track a target on a screen (0.23 and 0.32 s, 9.6 and 12 rad/s, as
+    models of the library ManualTracking have them); the threshold is far above the 0.05 deg/s from
+    which people see motion in the laboratory (Pasternak and Merigan 1980), which is a swing of 0.1
+    deg on 27 m of rope, seen from 40 m.
+
+    Examples
+    --------
+    >>> from swashplate.crane import control
+    >>> control.Crew(delay=0.4).description()
+    'a crew that is 0.4 s late, sees swing from 0.5 deg on, and answers it with 0.3 /s, at ...'
+    """
+
+    delay: float = 0.3
+    """Time from eye to hand, at most 10; assumed. [s]"""
+    threshold_deg: float = 0.5
+    """Swing that the operator does not answer, at most 30; assumed. [deg]"""
+    gain: float = 0.3
+    """Speed of the tip for each metre of swing, at most 10; assumed. [1/s]"""
+    share: float = 0.8
+    """Part that is used of the speed min(v, a/ω₀) that slew and luff can follow at the load's
+    period, as of somebody who knows this crane, at most 10; assumed. 10 is the stick's whole travel
+    on most cranes."""
+    lag: float = 0.1
+    """Time constant of arm and hand, 0.01 to 10; assumed. [s]"""
+    return_time: float = 30.0
+    """Time constant with which the operator brings the tip back to the place that the command gives
+    it, and takes what hangs out for rest, 1 to 1000; assumed. [s]"""
+    kind = "crew"
+
+    def __post_init__(self) -> None:
+        for name, least, most in HUMAN:
+            value = getattr(self, name)
+            if not (isinstance(value, Real) and least <= float(value) <= most):
+                raise InputError(
+                    f"The {name} of a crew is {value!r}, but must be a number from {least:g} to "
+                    f"{most:g}."
+                )
+
+    def description(self) -> str:
+        """Its delay, threshold, gain and share."""
+        return (
+            f"a crew that is {self.delay:g} s late, sees swing from {self.threshold_deg:g} deg on, "
+            f"and answers it with {self.gain:g} /s, at {self.share:g} of what slew and luff can "
+            "follow"
+        )
+
+    def operator(self) -> HumanOperator:
+        """As the loop takes it."""
+        return HumanOperator(
+            gain=float(self.gain),
+            delay=round(self.delay * RATE),
+            threshold=radians(self.threshold_deg),
+            share=float(self.share),
+            lag=float(self.lag),
+            return_time=float(self.return_time),
+        )
+
+
+@dataclass(frozen=True)
 class Controller(Control):
     """User-defined controller: a model of the engine whose outputs offset the reference tip.
 
@@ -374,7 +453,7 @@ def stages_of(control: Control | None) -> Stages:
     if not isinstance(control, Control):
         raise InputError(f"{control!r} is not a crane control; see swashplate.crane.control.")
     settings: dict[str, Any] = {
-        "path": any(not isinstance(stage, Sensors) for stage in control.stages)
+        "path": any(not isinstance(stage, Sensors | Crew) for stage in control.stages)
     }
     controller: Controller | None = None
     sensors: Sensors | None = None
@@ -395,6 +474,8 @@ def stages_of(control: Control | None) -> Stages:
             case Sensors():
                 settings["sensing"] = stage.sensing()
                 sensors = stage
+            case Crew():
+                settings["crew"] = stage.operator()
             case Controller():
                 controller = stage
     return Stages(Settings(**settings), controller, sensors)

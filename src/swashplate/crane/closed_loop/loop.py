@@ -3,8 +3,8 @@
 One sample after the other, at the drives' own rate:
 
 1. what control sees is the last sample, as a controller's computer has it, or what sensors say;
-2. the stick's commands become reference speeds of the shafts; if the tip is controlled, through its
-   path, the offsets and the clip;
+2. the stick's commands, with what a crew adds, become reference speeds of the shafts; if the tip is
+   controlled, through its path, the offsets and the clip;
 3. reference speeds become speeds: instantaneously (ideal drives), or by voltages, which each drive
    takes by the engine's compiled step;
 4. shafts move the tip, the ship moves the crane, the tip leads the load.
@@ -15,7 +15,7 @@ they are marched before.
 
 from __future__ import annotations
 
-from math import atan2, floor, inf, pi, sqrt
+from math import atan2, cos, floor, inf, pi, sin, sqrt
 from typing import NamedTuple
 
 import numpy as np
@@ -23,6 +23,7 @@ from numpy.typing import NDArray
 
 from swashplate.crane.closed_loop.signals import ABSENT, LOAD, PULL, SHAFT, SPEED, TIP, Columns
 from swashplate.crane.control import SEEN, Sensing, Settings
+from swashplate.crane.crew import CrewMemory, Drivable, catch_swing, view_of
 from swashplate.crane.kinematics import (
     Boom,
     Geometry,
@@ -125,6 +126,7 @@ class LoopArrays(NamedTuple):
     """Measurements that are on their way, a row each: numbers of `Seen`."""
     noise: Array
     """(n, 4) of each measurement to come, of root mean square 1: rope x and y, roll, pitch."""
+    crew: CrewMemory
     margins: Array
     """Worst margins of the domains of the drives and the controller."""
     marched: tuple[Array, ...]
@@ -497,6 +499,10 @@ def advance_crane(
     memory = arrays.memory
     margins = arrays.margins
     marched = arrays.marched
+    drivable = (
+        Drivable(inverses[1].low, inverses[1].high, inverses[1].acceleration),
+        Drivable(inverses[2].low, inverses[2].high, inverses[2].acceleration),
+    )
     moving = ship.shape[1] > 1
     sample, axes, tip, hung, rest_time, brake = state
     shafts = shafts_of(axes, ANGLE)
@@ -519,6 +525,18 @@ def advance_crane(
             r = rotation(angles.x, angles.y, angles.z)
         for i in range(3):
             reference[i] = limited(stick[m, i], inverses[i])
+        if settings.crew.gain > 0.0:
+            slew = home.slew + shafts.slew
+            swing = add_scaled(hung.hook, -1.0, tip)
+            view = view_of(
+                (to_ship(r, swing), to_ship(r, Vector(0.0, 0.0, -rope))),
+                rope,
+                (cos(slew), sin(slew)),
+                boom,
+                (shafts.slew, shafts.luff),
+                g,
+            )
+            catch_swing(reference, view, drivable, arrays.crew, settings.crew, sample, h)
         if settings.path:
             # 1. what control sees
             swing = add_scaled(hung.hook, -1.0, tip)

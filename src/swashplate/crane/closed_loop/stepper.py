@@ -17,6 +17,7 @@ from swashplate.crane.closed_loop.loop import Fixed, Inverse, LoopArrays, State
 from swashplate.crane.closed_loop.signals import ROWS, Signals, columns_of
 from swashplate.crane.control import GIVES, SEEN, Control, stages_of
 from swashplate.crane.crane import Crane
+from swashplate.crane.crew import new_memory
 from swashplate.crane.kinematics import Shafts, Vector, boom_at, rope_length, shaft_torques, tip_of
 from swashplate.crane.rope import (
     AIR,
@@ -152,7 +153,10 @@ class CraneStepper:
             picks = np.array([SEEN.index(name) for name in names], dtype=np.int64)
         # in open loop nothing acts back on the drives
         self._open = (
-            not settings.path and not fixed.loaded and fixed.actuation in (loop.VOLTS, loop.INVERSE)
+            not settings.path
+            and settings.crew.gain == 0.0
+            and not fixed.loaded
+            and fixed.actuation in (loop.VOLTS, loop.INVERSE)
         )
         g = fixed.geometry
         home = fixed.home
@@ -182,6 +186,7 @@ class CraneStepper:
             memory=memory,
             readings=np.zeros((1 << on_their_way.bit_length(), loop.READINGS)),
             noise=np.zeros((0, loop.NOISY)),
+            crew=new_memory(settings.crew.delay),
             margins=np.full(4, np.inf),
             marched=(np.zeros(0),) * 9,
         )

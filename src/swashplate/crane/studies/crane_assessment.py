@@ -45,6 +45,7 @@ from swashplate.crane.studies.run_outcome import RunOutcome
 from swashplate.crane.studies.spectral import LinearResponse
 from swashplate.crane.studies.study import (
     CALM,
+    CREW_ASSUMED,
     CREW_NOT_MODELLED,
     NO_CONTROL,
     Study,
@@ -585,7 +586,9 @@ class Assessment(Tabular, Drawn):
                     f"sines of up to {source.fastest_sine:.3g} Hz: test it faster."
                 )
         unworkable = any(quantity.within == "no" for quantity in self.limited(NO_CONTROL))
-        if unworkable and spectrum.height <= CALM:
+        if self.study.crewed:
+            sentences.append(CREW_ASSUMED)
+        elif unworkable and spectrum.height <= CALM:
             sentences.append(CREW_NOT_MODELLED)
         return [*sentences, *assumed_sentences(crane)]
 

@@ -5,7 +5,8 @@ its cells and each heading the frequency domain gives what is linear: the crane 
 with control as long as no drive is at a limit. A cell is simulated if that is near a limit, or asks
 of a drive what it cannot do, and judged as a verdict is. At one period and heading, what is beyond
 a limit stays beyond it in higher waves, so that only the boundary is looked for, and what limits
-first, as the sea rises, is what limits all seas above.
+first, as the sea rises, is what limits all seas above. A crew does not answer small swing, so that
+no cell is workable with it by the frequency domain alone.
 """
 
 from __future__ import annotations
@@ -45,6 +46,7 @@ from swashplate.crane.studies.spectral import DEMANDS, linear_response
 from swashplate.crane.studies.study import (
     BUILT,
     CALM,
+    CREW_ASSUMED,
     CREW_NOT_MODELLED,
     IDEAL,
     NO_CONTROL,
@@ -134,6 +136,8 @@ class Operability(Tabular):
     """Ship, peak factor, spreading."""
     case: str
     """Sentences on pose and control of the crane, and on the simulation of cells."""
+    crewed: bool
+    """Whether a crew is among the variants."""
     hoist_limit: tuple[float, float, float]
     """Least significant height at which the hoist is too slow for the hook, with period and
     heading; inf if none. [m], [s], [deg]"""
@@ -246,7 +250,9 @@ class Operability(Tabular):
                 "value holds its limit, or control sometimes fails to take over the swing that it "
                 "is switched on in."
             )
-        if self._lowest_unworkable() <= CALM:
+        if self.crewed:
+            sentences.append(CREW_ASSUMED)
+        elif self._lowest_unworkable() <= CALM:
             sentences.append(CREW_NOT_MODELLED)
         return (*sentences, *assumed_sentences(self.crane))
 
@@ -352,6 +358,7 @@ def operability(
         cells=ordered,
         seaway=base,
         case=case,
+        crewed=study.crewed,
         hoist_limit=hoist,
     )
 
@@ -426,9 +433,13 @@ class _Linear(NamedTuple):
     """Largest part for each metre of what drives and clip can do that control asks for."""
     limits: Mapping[str, float]
     """Of quantities that the frequency domain has."""
+    idle: _Idle | None = None
+    """Waves in which the crew has nothing to do."""
 
     def ratio(self, height: float) -> float:
         """Largest ratio of a value to its limit in waves of a height."""
+        if self.idle is not None and height < self.idle.height:
+            return self.idle.without.ratio(height)
         ratios = [
             (self.mean[name] + height * self.slope[name]) / limit
             for name, limit in self.limits.items()
@@ -448,6 +459,8 @@ class _Linear(NamedTuple):
 
     def decision(self, height: float) -> Decision:
         """Whether the crane works; not decided if too near a limit, of a drive as well."""
+        if self.idle is not None and height < self.idle.height:
+            return self.idle.without.decision(height)
         ratio = self.ratio(height)
         if self.demand == 0.0:  # no drive moves
             return "no" if ratio > 1.0 else "yes"
@@ -457,19 +470,34 @@ class _Linear(NamedTuple):
         return "yes" if far else "not decided"
 
 
+class _Idle(NamedTuple):
+    """Waves so low that a crew sees no swing and does nothing."""
+
+    height: float
+    """[m]"""
+    without: _Linear
+    """The crane without the crew."""
+
+
 def _linear(case: Case, sea: Seaway, limits: Mapping[str, float]) -> _Linear:
     """The first of a case's cranes in a sea of `LOW_SEA`, in the frequency domain."""
     control = case.options["control"]
     response = linear_response(case.cranes[0], sea, control, **case.pose, **case.hangs)
     values = response.values
     known = {name: limit for name, limit in limits.items() if name in values}
-    named = {*known, "hoist_demand"}
+    named = {*known, "hoist_demand", "off_lead", "side_lead"}
     mean = {name: abs(values[name].mean) for name in named}
     slope = {name: (values[name].largest - mean[name]) / LOW_SEA for name in named}
     if control is None:
         return _Linear(slope, mean, 0.0, known)
     demands = [name for name in DEMANDS if name in values and (case.driven or name == "clip")]
     demand = max((values[name].largest for name in demands), default=0.0)
+    operator = stages_of(control).settings.crew
+    if operator.gain > 0.0:  # not linear in any waves in which it sees the swing
+        without = _linear(case.changed(control=None), sea, limits)
+        seen = max(without.slope["off_lead"], without.slope["side_lead"])
+        idle = _Idle(operator.threshold / NEAR / seen if seen > 0.0 else np.inf, without)
+        return _Linear(slope, mean, np.inf, known, idle)
     return _Linear(slope, mean, max(demand, _demand_at_start(case, sea)) / LOW_SEA, known)
 
 

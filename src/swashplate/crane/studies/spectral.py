@@ -2,7 +2,8 @@
 
 The ship's transfer functions move the tip; the tip moves the load, a damped pendulum; a spectrum of
 waves gives the variances of all that is linear in them. Control by delayed feedback and ship
-compensation is linear as long as the drives follow instantaneously. The result checks every
+compensation is linear as long as the drives follow instantaneously, and so is a crew that answers
+the least swing. The result checks every
 simulated crane without control, and is the first answer on every sea of a year.
 """
 
@@ -16,9 +17,11 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from swashplate.crane.axes import RATE
 from swashplate.crane.closed_loop.loop import largest_sine
 from swashplate.crane.control import Control, Settings, stages_of
 from swashplate.crane.crane import Crane
+from swashplate.crane.crew import HumanOperator
 from swashplate.crane.kinematics import boom_at, reach_rate, tip_of
 from swashplate.crane.limits import LIMITED
 from swashplate.crane.rope import GRAVITY, Suspension
@@ -122,9 +125,9 @@ def linear_response(
     sea : Seaway
         By default sea state 3 abeam on the packaged hull.
     control : Control, optional
-        Delayed feedback and ship compensation of drives that follow instantaneously; a shaper, a
-        position loop and a clip change nothing as long as the operator's stick rests and the clip
-        does not act.
+        Delayed feedback, ship compensation and a crew, on drives that follow instantaneously; a
+        shaper, a position loop and a clip change nothing as long as the operator's stick rests and
+        the clip does not act. The crew is one without threshold and share.
     slew_deg, boom_deg, rope_m, swing_damping, load, suspension
         As of `simulate`.
     duration : float
@@ -133,7 +136,8 @@ def linear_response(
     Raises
     ------
     InputError
-        For a user-defined controller, whose transfer function is not known, for a damping of 0
+        For a user-defined controller, whose transfer function is not known, for a crew together
+        with control of the tip, which its hand then works through, for a damping of 0
         without control, with which the swing has no stationary state, and as of `Crane.home`.
 
     Notes
@@ -141,7 +145,9 @@ def linear_response(
     With the tip's horizontal motion T due only to the ship, the load's position d from the tip
     obeys d (ω₀² - ω² + 2 i ζ ω₀ ω - ω² k e^{-iωτ}) = ω² (1 - c) T, with gain k and delay τ of the
     feedback, and c = 1 if the ship's motion is compensated. ω is the frequency as the ship meets
-    the waves.
+    the waves. A crew with gain K, return time T_r and D = e^{-iωτ}/(1 + iωT_n) moves the tip by
+    F = K D iωT_r/(1 + iωT_r)/(iω + D/T_r) times the swing that it sees, which has the ship's roll
+    and pitch in it.
     """
     seaway = Seaway() if sea is None else sea
     settings, controller, _ = stages_of(control)
@@ -150,8 +156,14 @@ def linear_response(
             "The frequency domain supports delayed feedback and ship compensation, not the "
             f"user-defined controller {controller.model.name}: simulate it."
         )
+    crewed = settings.crew.gain > 0.0
+    if crewed and settings.path:
+        raise InputError(
+            "The frequency domain supports a crew or control of the tip, not the crew's hand "
+            "through control of the tip: simulate it."
+        )
     damping = crane.swing_damping if swing_damping is None else swing_damping
-    if damping <= 0.0 and settings.feedback <= 0.0 and not settings.ship:
+    if damping <= 0.0 and settings.feedback <= 0.0 and not (settings.ship or crewed):
         raise InputError(
             "Without damping the swing in waves grows without bound: swing_damping must be above "
             "0, as 0.005."
@@ -163,12 +175,15 @@ def linear_response(
     arm = np.array(tip_of(home.slew, boom, g))
     motion = seaway.response(waves.frequency, waves.heading)
     tip = tip_motion(motion, arm)
-    tip_under_control, load_from_tip = _controlled(tip, waves.encounter, rope_m, damping, settings)
+    # a plumb line in the ship's axes, which turn by roll and pitch
+    plumb = np.array([motion[4], -motion[3]])
+    tip_under_control, load_from_tip = _controlled(
+        tip, plumb, waves.encounter, rope_m, damping, settings
+    )
     c, s = cos(home.slew), sin(home.slew)
     along = np.array([c, -s])
     across = np.array([-s, -c])
-    # the rope's direction in the ship's axes, which turn by roll and pitch
-    direction = load_from_tip / rope_m + np.array([motion[4], -motion[3]])
+    direction = load_from_tip / rope_m + plumb
     inclined = np.array([radians(seaway.trim_deg), -radians(seaway.list_deg)])
     vertical = 1j * waves.encounter * tip[2]
     mass = crane.safe_load if load is None else load
@@ -250,15 +265,29 @@ def swing_response(omega: Array, rope: float, damping: float) -> Complex:
 
 
 def _controlled(
-    tip: Complex, omega: Array, rope: float, damping: float, settings: Settings
+    tip: Complex, plumb: Complex, omega: Array, rope: float, damping: float, settings: Settings
 ) -> tuple[Complex, Complex]:
-    """The tip's horizontal motion under control, and load less tip, (2, n) each."""
-    uncompensated = (0.0 if settings.ship else 1.0) * tip[:2]
+    """The tip's horizontal motion under control, and load less tip, (2, n) each.
+
+    `plumb` is the direction of a plumb line in the ship's axes, which a crew sees as swing. [rad]
+    """
+    moved = (0.0 if settings.ship else 1.0) * tip[:2]
     natural = sqrt(GRAVITY / rope)
     feedback = settings.feedback * np.exp(-2j * pi * settings.delay * omega / natural)
+    if settings.crew.gain > 0.0:
+        feedback = crew_response(omega, settings.crew)
+        moved = moved + feedback * rope * plumb
     stiffness = natural**2 - omega**2 * (1.0 + feedback) + 2j * damping * natural * omega
-    load = omega**2 * uncompensated / stiffness
-    return uncompensated + feedback * load, load
+    load = omega**2 * moved / stiffness
+    return moved + feedback * load, load
+
+
+def crew_response(omega: Array, operator: HumanOperator) -> Complex:
+    """Offset of the tip over the swing that a crew without threshold sees, on ideal drives."""
+    s = 1j * omega
+    hand = np.exp(-s * operator.delay / RATE) / (1.0 + operator.lag * s)
+    kept = operator.return_time * s / (1.0 + operator.return_time * s)
+    return np.asarray(operator.gain * kept * hand / (s + hand / operator.return_time))
 
 
 def _bounce(omega: Array, rope: float, mass: float, suspension: Suspension) -> Complex:

@@ -20,7 +20,7 @@ from swashplate.crane.closed_loop.operator_command import OperatorCommand
 from swashplate.crane.closed_loop.result import FARTHEST_SWING, CraneRun
 from swashplate.crane.closed_loop.simulating import prepare, simulate
 from swashplate.crane.closed_loop.stepper import Actuation, RunOptions, feels_load
-from swashplate.crane.control import Clip, Control
+from swashplate.crane.control import Clip, Control, Crew
 from swashplate.crane.crane import Crane
 from swashplate.crane.kinematics import Vector, boom_at, rotation, tip_of, to_inertial
 from swashplate.crane.limits import LIMITED
@@ -46,6 +46,8 @@ ACTUATED: Mapping[str, Actuation] = {IDEAL: "ideal", BUILT: "inverse", "volts": 
 full speed."""
 NO_CONTROL = "no control"
 """The crane as it is built, under the operator's command only."""
+CREW = "crew"
+"""The same with an operator who damps the swing by hand."""
 EVALUATED_TIME, RUN_IN = 600.0, 120.0
 """Time for which a run counts, and that of its run-in: seven decay times of a swing that control
 damps by 10 %. [s]"""
@@ -53,9 +55,11 @@ CALM = 0.25
 """Height of a sea in which people work with cranes; a crane that cannot, by the model, is damped by
 its crew. The lowest class of most scatter diagrams. [m]"""
 CREW_NOT_MODELLED = (
-    "Not modelled is what a crew does: it damps the swing by moving the boom and with tag lines, "
-    "so that a crane without control may work where it is not shown to."
+    "Not modelled is what a crew does: it damps the swing by moving the boom, which the option "
+    "crew adds, and with tag lines, so that a crane without control may work where it is not shown "
+    "to."
 )
+CREW_ASSUMED = "No number of the crew was measured on a crane's operator: all are assumed."
 SHORTEST = 60.0
 """Least time for which a run counts. [s]"""
 LARGEST_START = 0.5
@@ -191,6 +195,7 @@ class Study(Result):
         seeds: Sequence[int],
         sea: str | Spectrum | Seaway = "ss3",
         drives: Drives = (IDEAL, BUILT),
+        crew: Control | None = None,
         command: OperatorCommand | None = None,
         length: float = EVALUATED_TIME,
         run_in: float = RUN_IN,
@@ -215,6 +220,9 @@ class Study(Result):
             ``"identified"``, the crane's own; ``"volts"``, these without their inverse maps. By
             name also other cranes, or several of which each seaway takes the next, see
             `drawn_cranes`.
+        crew : Control, optional
+            `control.Crew`, which adds the variant ``"crew"``: no control, but an operator who damps
+            the swing by hand, on the crane's own drives.
         command : OperatorCommand, optional
             What the operator does; by default nothing, the crane keeps its load in place. Its
             length is then that of each run.
@@ -246,7 +254,8 @@ class Study(Result):
             )
         set_here = ("control", "actuation", "load_offset", "load_velocity")
         run_options = [name for name in RunOptions.__annotations__ if name not in set_here]
-        keywords = ("seeds", "sea", "drives", "command", "length", "run_in", *run_options)
+        of_study = ("seeds", "sea", "drives", "crew", "command", "length", "run_in")
+        keywords = (*of_study, *run_options)
         check_names("A study has no", options, keywords, "it has")
         if not (length >= SHORTEST and run_in >= 0.0):
             raise InputError(
@@ -264,6 +273,8 @@ class Study(Result):
         pose: Any = {"slew_deg": 90.0, "boom_deg": 45.0, "rope_m": 27.0, **options}
         none = Case((crane,), pose | {"control": None, "actuation": "inverse"}, command)
         cases = {NO_CONTROL: none}
+        if crew is not None:
+            cases[CREW] = none.changed(control=crew)
         for controller, stages in controllers.items():
             for name, drives_of_set in sets.items():
                 case = _driven(none.changed(control=stages), name, drives_of_set)
@@ -280,6 +291,13 @@ class Study(Result):
             executor=executor or Threads(),
             progress=progress,
         )
+
+    @property
+    def crewed(self) -> bool:
+        """Whether a crew is among the variants."""
+        controls = [case.options["control"] for case in self.cases.values()]
+        stages = [stage for control in controls if control is not None for stage in control.stages]
+        return any(isinstance(stage, Crew) for stage in stages)
 
     def provenance(self) -> tuple[str, ...]:
         """Sentences on the drives of all its cranes, each once: `Crane.provenance`."""

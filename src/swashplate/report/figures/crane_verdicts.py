@@ -352,10 +352,13 @@ def plot_operability(result: Operability, *, title: str | None = None) -> Figure
         panel.set_ylabel("significant height (m)", fontsize=style.NORMAL, color=style.INK)
     seaway = result.seaway
     ship = f"roll {seaway.ship.roll_period:g} s" if isinstance(seaway.ship, Hull) else ""
-    headings = count(len(result.headings), "heading")
+    of_headings = f"the more of {count(len(result.headings), 'heading')} cannot be worked"
+    shades = f"the stronger a colour, {of_headings}"
+    if len(result.headings) == 1:
+        shades = f"waves from {result.headings[0]:g} deg"
     note = result.scatter.note.removesuffix(".")
     texts = [
-        f"the stronger a colour, the more of {headings} cannot be worked",
+        shades,
         ship,
         note[:1].lower() + note[1:],
         assumed(result.crane),
