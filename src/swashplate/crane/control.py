@@ -5,8 +5,8 @@ loop they act in one order, whatever order they are written in: path of the tip,
 of the tip (feedback, ship, user-defined), clip, inverse kinematics, position loop. Every stage
 works on the path of the tip. It brings a position loop of 0.7 /s with it, by which the shafts
 follow that path; `PositionLoop` sets another gain. `Sensors` says how well control sees the crane;
-without sensors it sees the true signals. The linear crane, `linearize`, is for controllers that are
-designed outside the package.
+without sensors it sees the true signals. For controllers that are designed outside the package
+`swashplate.linearize` takes the crane as a machine, `swashplate.crane.plant`, or its `body` alone.
 """
 
 from __future__ import annotations

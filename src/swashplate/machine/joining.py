@@ -64,8 +64,8 @@ def join(
         the whole is a machine with their numbers.
     links : mapping of str, optional
         What an input takes, by its path, such as ``{"load.pull": "winch.shaft_torque"}``: a signal,
-        an equation over the signals that its arguments name, or a tuple of an equation and the
-        paths of its signals. Any other name becomes a further signal.
+        another input, an equation over the signals that its arguments name, or a tuple of an
+        equation and the paths of its signals. Any other name becomes a further signal.
     **changes
         `integrals`, `outputs`, `free_start`, `replacements` of the whole. Members keep theirs.
 
@@ -108,7 +108,8 @@ def join(
         if isinstance(wire, str):
             if at not in inputs:
                 raise InputError(f"Model {name}: there is no input {near_names(wanted, inputs)}.")
-            parts = [_wired(part, at, _signal(name, parts, linked, wire)) for part in parts]
+            source = _signal(name, parts, linked, wire, [each for each in inputs if each != at])
+            parts = [_wired(part, at, source) for part in parts]
         else:
             linked[at] = _link(name, at, parts, wire)
 
@@ -223,15 +224,20 @@ def _wired(part: Model, at: str, signal: str) -> Model:
     return replace(part, parts=(), wired={**part.wired, **dict.fromkeys(inputs, signal)})
 
 
-def _signal(name: str, parts: Sequence[Model], links: Mapping[str, Link], wanted: str) -> str:
-    """Full name of a signal of some parts, or of a link."""
-    signals = [part.full(each) for part in parts for each in part.signal_names]
-    found = full_name(wanted, [*links, *signals])
-    if found not in (*links, *signals):
-        raise InputError(
-            f"Model {name}: there is no signal {near_names(wanted, [*links, *signals])}."
-        )
-    return found
+def _signal(
+    name: str,
+    parts: Sequence[Model],
+    links: Mapping[str, Link],
+    wanted: str,
+    inputs: Sequence[str] = (),
+) -> str:
+    """Full name of a signal of some parts, of a link or, if there is none, of some inputs."""
+    signals = [*links, *(part.full(each) for part in parts for each in part.signal_names)]
+    for names in (signals, inputs):
+        found = full_name(wanted, names)
+        if found in names:
+            return found
+    raise InputError(f"Model {name}: there is no signal {near_names(wanted, signals)}.")
 
 
 def _link(name: str, at: str, parts: Sequence[Model], wire: Any) -> Link:

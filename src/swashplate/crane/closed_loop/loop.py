@@ -42,6 +42,7 @@ from swashplate.crane.kinematics import (
     to_inertial,
     to_ship,
 )
+from swashplate.crane.motion import BRAKE_TAKES, BRAKE_WAITS
 from swashplate.crane.rope import (
     GRAVITY,
     Hanging,
@@ -65,8 +66,6 @@ FINE, TOO_FAST, BOOM_OUT, ROPE_OUT, NO_NUMBER = range(5)
 ANGLE, SHAFT_SPEED, OPERATOR_ANGLE, OPERATOR_SPEED, REFERENCE_ANGLE, TORQUE = range(6)
 """Shafts' angles and speeds; angles to which only the stick would have brought them, and its
 speeds; reference angles of control; torques of the rope. [rad], [rad/s], [N m]"""
-BRAKE_WAITS, BRAKE_TAKES = 0.3, 0.2
-"""Time at rest before the hoist's brake falls in, and time in which it stops the drum. [s]"""
 PATH, SWING = 0, 2
 """Rows of the memory of delayed signals, of each its x and y."""
 ROUNDING = 1e-9
@@ -411,13 +410,13 @@ def led_load(
     s = fixed.hanging
     start = fixed.start
     if sample == 0:
-        return hanging_load(next_tip, start.offset[0], start.offset[1], rope, s)
+        return hanging_load(next_tip, start.offset_x, start.offset_y, rope, s)
     square = h * h
     if sample == 1:
         square = 0.5 * square
         tip_step = add_scaled(next_tip, -1.0, tip)
-        v = start.velocity
-        hung = set_off(hung, tip, tip_step, rope - previous_rope, v[0], v[1], h)
+        v_x, v_y = start.velocity_x, start.velocity_y
+        hung = set_off(hung, tip, tip_step, rope - previous_rope, v_x, v_y, h)
     return rope_step(hung, tip, next_tip, rope, s, h, square)
 
 
