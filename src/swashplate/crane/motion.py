@@ -130,6 +130,15 @@ class BodyLimits(NamedTuple):
 
 
 @equation
+def tip_at(shafts: Shafts, inputs: BodyInputs, p: Body) -> Vector:
+    """Tip of the boom, inertial, at angles of the shafts. [m]"""
+    r = rotation(inputs.roll, inputs.pitch, inputs.yaw)
+    boom = boom_at(shafts.luff, p.geometry, p.home)
+    shift = Vector(inputs.surge, inputs.sway, inputs.heave)
+    return to_inertial(r, tip_of(p.home.slew + shafts.slew, boom, p.geometry), shift)
+
+
+@equation
 def next_hung(state: BodyState, tip: Vector, rope: float, p: Body, h: float) -> Hung:
     """Load and hook at a sample, after the tip has moved and the rope has changed its length. [m]
 
@@ -172,8 +181,7 @@ def body_sample(state: BodyState, inputs: BodyInputs, p: Body, h: float) -> Body
     rope = rope_length(shafts, g, p.home)
     r = rotation(inputs.roll, inputs.pitch, inputs.yaw)
     slew = p.home.slew + shafts.slew
-    shift = Vector(inputs.surge, inputs.sway, inputs.heave)
-    tip = to_inertial(r, tip_of(slew, boom, g), shift)
+    tip = tip_at(shafts, inputs, p)
     hung = next_hung(state, tip, rope, p, h)
     d = add_scaled(hung.load, -1.0, tip)
     along = add_scaled(hung.hook, -1.0, tip)
@@ -231,16 +239,17 @@ def body_step(state: BodyState, signals: BodySignals, inputs: BodyInputs) -> Bod
 
 
 @equation
-def body_settled(inputs: BodyInputs, p: Body) -> BodyState:
-    """The load at rest below the tip, in calm air, at home and under these constant inputs."""
-    shafts = Shafts(0.0, 0.0, 0.0)
-    boom = boom_at(shafts.luff, p.geometry, p.home)
-    rope = rope_length(shafts, p.geometry, p.home)
-    r = rotation(inputs.roll, inputs.pitch, inputs.yaw)
-    shift = Vector(inputs.surge, inputs.sway, inputs.heave)
-    tip = to_inertial(r, tip_of(p.home.slew, boom, p.geometry), shift)
-    hung = hanging_load(tip, 0.0, 0.0, rope, p.hanging)
+def body_settled(inputs: BodyInputs, p: Body, h: float) -> BodyState:
+    """The load straight below the tip and moving with it, at home, in calm air."""
     speeds = Shafts(inputs.hoist_speed, inputs.slew_speed, inputs.luff_speed)
+    shafts = Shafts(0.0, 0.0, 0.0)
+    before = Shafts(-h * speeds.hoist, -h * speeds.slew, -h * speeds.luff)
+    rope = rope_length(shafts, p.geometry, p.home)
+    lowered = rope - rope_length(before, p.geometry, p.home)
+    tip = tip_at(shafts, inputs, p)
+    tip_step = add_scaled(tip, -1.0, tip_at(before, inputs, p))
+    hung = hanging_load(tip, 0.0, 0.0, rope, p.hanging)
+    hung = set_off(hung, tip, tip_step, lowered, 0.0, 0.0, h)
     return BodyState(
         samples=2.0,
         last_speed=speeds,
