@@ -9,8 +9,10 @@ from math import atan2, cos, sin, sqrt
 from typing import Annotated, NamedTuple
 
 from swashplate.crane.kinematics import (
+    Boom,
     Geometry,
     Home,
+    Rotation,
     Shafts,
     Vector,
     add_scaled,
@@ -139,32 +141,45 @@ def tip_at(shafts: Shafts, inputs: BodyInputs, p: Body) -> Vector:
 
 
 @equation
-def next_hung(state: BodyState, tip: Vector, rope: float, p: Body, h: float) -> Hung:
+def led_load(
+    before: Hung,
+    last_tip: Vector,
+    tip: Vector,
+    rope: float,
+    last_rope: float,
+    samples: float,
+    start: Start,
+    s: Hanging,
+    h: float,
+) -> Hung:
     """Load and hook at a sample, after the tip has moved and the rope has changed its length. [m]
 
-    At the first one the load hangs still, at its offset. The second step of Verlet's method is half
-    a step from a given velocity.
+    At the first sample the load hangs still, at its offset; `samples` are those before this one.
+    The second step of Verlet's method is half a step from a given velocity.
     """
-    now = Hung(
-        load=state.last_load,
-        previous_load=state.earlier_load,
-        hook=state.last_hook,
-        previous_hook=state.earlier_hook,
-        pull=state.last_pull,
-        stretch=state.last_stretch,
-    )
-    if state.samples < 0.5:
-        now = hanging_load(tip, p.start.offset_x, p.start.offset_y, rope, p.hanging)
+    hung = before
+    if samples < 0.5:
+        hung = hanging_load(tip, start.offset_x, start.offset_y, rope, s)
     else:
         square = h * h
-        if state.samples < 1.5:
+        if samples < 1.5:
             square = 0.5 * square
-            tip_step = add_scaled(tip, -1.0, state.last_tip)
-            lowered = rope - state.last_rope
-            v_x, v_y = p.start.velocity_x, p.start.velocity_y
-            now = set_off(now, state.last_tip, tip_step, lowered, v_x, v_y, h)
-        now = rope_step(now, state.last_tip, tip, rope, p.hanging, h, square)
-    return now
+            tip_step = add_scaled(tip, -1.0, last_tip)
+            v_x, v_y = start.velocity_x, start.velocity_y
+            hung = set_off(hung, last_tip, tip_step, rope - last_rope, v_x, v_y, h)
+        hung = rope_step(hung, last_tip, tip, rope, s, h, square)
+    return hung
+
+
+@equation
+def rope_torques(
+    hung: Hung, tip: Vector, r: Rotation, slew: float, boom: Boom, mass: float, g: Geometry
+) -> Shafts:
+    """Torques of the rope's tension on the three shafts. [N m]"""
+    tension = mass * hung.pull
+    along = add_scaled(hung.hook, -1.0, tip)
+    force = add_scaled(Vector(0.0, 0.0, 0.0), tension / norm(along), along)
+    return shaft_torques(to_ship(r, force), slew, boom, tension, g)
 
 
 @equation
@@ -182,12 +197,28 @@ def body_sample(state: BodyState, inputs: BodyInputs, p: Body, h: float) -> Body
     r = rotation(inputs.roll, inputs.pitch, inputs.yaw)
     slew = p.home.slew + shafts.slew
     tip = tip_at(shafts, inputs, p)
-    hung = next_hung(state, tip, rope, p, h)
+    before = Hung(
+        load=state.last_load,
+        previous_load=state.earlier_load,
+        hook=state.last_hook,
+        previous_hook=state.earlier_hook,
+        pull=state.last_pull,
+        stretch=state.last_stretch,
+    )
+    hung = led_load(
+        before,
+        state.last_tip,
+        tip,
+        rope,
+        state.last_rope,
+        state.samples,
+        p.start,
+        p.hanging,
+        h,
+    )
     d = add_scaled(hung.load, -1.0, tip)
     along = add_scaled(hung.hook, -1.0, tip)
-    tension = p.mass * hung.pull
-    force = add_scaled(Vector(0.0, 0.0, 0.0), tension / norm(along), along)
-    torques = shaft_torques(to_ship(r, force), slew, boom, tension, g)
+    torques = rope_torques(hung, tip, r, slew, boom, p.mass, g)
     lead = to_ship(r, along)
     c, s = cos(slew), sin(slew)
     return BodySignals(
@@ -213,7 +244,7 @@ def body_sample(state: BodyState, inputs: BodyInputs, p: Body, h: float) -> Body
         swing=atan2(sqrt(d.x * d.x + d.y * d.y), -d.z),
         off_lead=atan2(lead.x * c - lead.y * s, -lead.z),
         side_lead=atan2(-lead.x * s - lead.y * c, -lead.z),
-        tension=tension,
+        tension=p.mass * hung.pull,
         torque_hoist=torques.hoist,
         torque_slew=torques.slew,
         torque_luff=torques.luff,
@@ -352,15 +383,20 @@ class BrakeSignals(NamedTuple):
 
 
 @equation
+def braked(state: BrakeState, voltage: float, lower: float, upper: float, h: float) -> BrakeState:
+    """The brake falls in some time after the voltage has come into the dead zone, and lifts."""
+    rest_time = state.rest_time + h if lower < voltage < upper else 0.0
+    change = h / BRAKE_TAKES if rest_time >= BRAKE_WAITS else -h / BRAKE_TAKES
+    return BrakeState(rest_time, min(max(state.share + change, 0.0), 1.0))
+
+
+@equation
 def brake_sample(
     state: BrakeState, voltage: float, speed: float, p: Brake, h: float
 ) -> BrakeSignals:
-    """The brake falls in some time after the voltage has come into the dead zone, and lifts."""
-    is_at_rest = p.lower < voltage < p.upper
-    rest_time = state.rest_time + h if is_at_rest else 0.0
-    change = h / BRAKE_TAKES if rest_time >= BRAKE_WAITS else -h / BRAKE_TAKES
-    share = min(max(state.share + change, 0.0), 1.0)
-    return BrakeSignals(rest_time, share, speed * (1.0 - share))
+    """The brake at a sample, and what it leaves of the hoist's speed."""
+    now = braked(state, voltage, p.lower, p.upper, h)
+    return BrakeSignals(now.rest_time, now.share, speed * (1.0 - now.share))
 
 
 @equation

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
+from functools import lru_cache
 from typing import Any, NamedTuple, overload
 
 from swashplate.errors import InputError
@@ -97,12 +98,43 @@ def join(
     ('port.voltage', 4)
     """
     members, machines = _members(name, models)
+    wires = tuple((links or {}).items())
+    try:
+        model = _joined_once(name, tuple(members), wires, tuple(changes.items()))
+    except TypeError:  # something of a list or a mapping, which has no hash
+        model = _joined(name, members, dict(wires), changes)
+    if not machines:
+        return model
+    numbers = tuple(part for machine in machines.values() for part in machine.parts)
+    rules = tuple(
+        each._replace(member=_path(key, each.member))
+        for key, machine in machines.items()
+        for each in machine.rules
+    )
+    return Machine.of_parts(model, numbers, name, rules)
+
+
+@lru_cache(maxsize=64)
+def _joined_once(
+    name: str,
+    members: tuple[tuple[str, Model], ...],
+    wires: tuple[tuple[str, Wire], ...],
+    changes: tuple[tuple[str, Any], ...],
+) -> Model:
+    """The same model again if the same ones are joined in the same way."""
+    return _joined(name, members, dict(wires), dict(changes))
+
+
+def _joined(
+    name: str, members: Members, links: Mapping[str, Wire], changes: dict[str, Any]
+) -> Model:
+    """A model of members."""
     parts = [part for key, model in members for part in _placed(key, model)]
     places = [part.path for part in parts]
     if len(set(places)) != len(places):
         raise InputError(f"Joined models need different names, not {', '.join(places)}.")
     linked = dict(_links_within(members))
-    for wanted, wire in (links or {}).items():
+    for wanted, wire in links.items():
         inputs = [part.tap(each).signal for part in parts for each in part.input_types]
         at = full_name(wanted, inputs)
         if isinstance(wire, str):
@@ -126,21 +158,13 @@ def join(
     model = Model(name, step=parts[0].step, parts=tuple(parts), links=linked, **kinds, **changes)
     for wrong in _too_late(model):
         raise InputError(wrong)
-    if not machines:
-        return model
-    numbers = tuple(part for machine in machines.values() for part in machine.parts)
-    rules = tuple(
-        each._replace(member=_path(key, each.member))
-        for key, machine in machines.items()
-        for each in machine.rules
-    )
-    return Machine.of_parts(model, numbers, name, rules)
+    return model
 
 
 # --- members --------------------------------------------------------------------------------------
 
 
-Members = list[tuple[str, Model]]
+Members = Sequence[tuple[str, Model]]
 """Models with their names, which are empty in series."""
 
 

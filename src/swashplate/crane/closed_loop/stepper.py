@@ -18,7 +18,7 @@ from swashplate.crane.control import GIVES, SEEN, Control, stages_of
 from swashplate.crane.crane import Crane
 from swashplate.crane.kinematics import Shafts, Vector, boom_at, rope_length, shaft_torques, tip_of
 from swashplate.crane.machines import Placing, body_numbers
-from swashplate.crane.motion import Body
+from swashplate.crane.motion import Body, BrakeState
 from swashplate.crane.rope import GRAVITY, hanging_load, swing_of, too_fast_sentence
 from swashplate.drive import Drive
 from swashplate.errors import DomainError, InputError
@@ -121,7 +121,7 @@ class CraneStepper:
         rope = float(rope_length(Shafts(0.0, 0.0, 0.0), g, home))
         start = fixed.start
         hung = hanging_load(tip, start.offset_x, start.offset_y, rope, fixed.hanging)
-        self._state = State(0, axes, tip, hung, 0.0, 0.0)
+        self._state = State(0, axes, tip, hung, BrakeState())
         longest = 2.0 * pi * sqrt(fixed.ropes[1] / GRAVITY) * RATE + 4.0
         memory = np.zeros((4, 1 << int(longest).bit_length()))
         memory[loop.PATH : loop.PATH + 2] = [[tip.x], [tip.y]]
