@@ -28,7 +28,6 @@ from swashplate.crane import (
     control,
     follow,
     kinematics,
-    linearize,
     simulate,
 )
 
@@ -49,8 +48,8 @@ crane = Crane.preset("tg3637")
 
 # %% [markdown]
 # ## The model
-# `linearize` gives the pendulum along the boom and across it, driven by the tip's speed u.
-# To each are added the tip's distance y from where the operator wants it over the sea, the drive
+# The load is a pendulum along the boom and one across it, driven by the tip's speed u. To each are
+# added the tip's distance y from where the operator wants it over the sea, the drive
 # as a lag T behind its command c, and what the ship adds to the tip's speed, w:
 #
 #     d' = v - u - w,   v' = -g/L d,   y' = u + w,   u' = (c - u)/T,   c' = a.
@@ -58,9 +57,8 @@ crane = Crane.preset("tg3637")
 # The program chooses the acceleration a of the command for each step.
 
 # %%
-linear = linearize(crane, POSE["boom_deg"], POSE["rope_m"])
 A, B = np.zeros((5, 5)), np.zeros((5, 2))
-A[:2, :2] = linear.A[:2, :2]
+A[0, 1], A[1, 0] = 1.0, -9.80665 / POSE["rope_m"]
 A[0, 3], A[2, 3] = -1.0, 1.0
 A[3, 3:] = -1.0 / LAG, 1.0 / LAG
 B[4, 0], B[0, 1], B[2, 1] = 1.0, -1.0, 1.0  # a, and the ship's w

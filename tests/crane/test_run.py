@@ -7,7 +7,6 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
-from scipy.signal import StateSpace, lsim
 
 from swashplate.crane import (
     Crane,
@@ -17,7 +16,6 @@ from swashplate.crane import (
     Suspension,
     assess,
     control,
-    linearize,
     simulate,
 )
 from swashplate.crane.rope import in_ship_axes
@@ -124,28 +122,6 @@ def test_map_of_delayed_feedback_has_the_roots_that_were_found_apart():
         control.feedback_damping(1.0, 0.25)
     with refuse("0 .* 1 period"):
         control.feedback_damping(0.2, 0.0)
-
-
-def test_linear_crane_swings_as_the_whole_one_does_by_little(crane):
-    command = OperatorCommand.trapezoid(
-        hoist=-0.005, slew=0.005, luff=-0.005, duration=8.0, length=20.0
-    )
-    how = {"actuation": "ideal", "boom_deg": 50.0, "rope_m": 25.0, "swing_damping": 0.0}
-    run = simulate(crane, command, **how)
-    model = linearize(crane, 50.0, 25.0)
-    system = StateSpace(model.A, model.B, model.C, np.zeros((5, 3)))
-    _, made, _ = lsim(system, run.shaft_speed, run.time)
-    across = np.radians(90.0 - run.slew_deg), np.radians(-run.slew_deg)
-    d = run.load - run.tip
-    out = d[:, 0] * np.cos(across[1]) + d[:, 1] * np.sin(across[1])
-    starboard = -(d[:, 0] * np.cos(across[0]) + d[:, 1] * np.sin(across[0]))
-    largest = np.abs(made[:, :2]).max(axis=0)
-    assert (largest > 1e-6).all()
-    np.testing.assert_allclose(out / run.rope, made[:, 0], atol=0.015 * largest[0])
-    np.testing.assert_allclose(starboard / run.rope, made[:, 1], atol=0.015 * largest[1])
-    np.testing.assert_allclose(run.rope - 25.0, made[:, 2], atol=1e-3)
-    np.testing.assert_allclose(np.radians(run.slew_deg), made[:, 3], atol=1e-9)
-    np.testing.assert_allclose(np.radians(run.boom_deg - 50.0), made[:, 4], atol=2e-5)
 
 
 @pytest.mark.parametrize("seed", [0, 1, 2])
@@ -725,7 +701,7 @@ REFUSED = [
     ({"sea": "ss3"}, r"sea .* Seaway\('ss3'\), .* rows"),
     ({"actuation": "hydraulic"}, "actuation .*'hydraulic'.* ideal, volts, inverse"),
     ({"actuation": "direct"}, "direct actuation .* CraneStepper"),
-    ({"winds": 3.0}, "'winds'.* control, .*, drag_area, wind"),
+    ({"winds": 3.0}, "'winds'.* drag_area, wind, control"),
     ({"wind": 3.0}, "wind .* 3.0, .* two speeds, forward and to port"),
     ({"wind": (1.0, 2.0, 0.0)}, r"wind .*\(1.0, 2.0, 0.0\), .* two speeds"),
     ({"wind": (float("nan"), 0.0)}, r"wind .*\(nan, 0.0\), .* two speeds"),

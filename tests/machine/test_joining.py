@@ -172,6 +172,19 @@ def test_a_stepper_and_a_linear_model_are_of_the_whole() -> None:
     assert poles[-3:] == pytest.approx(expected, rel=1e-9)
 
 
+def test_an_input_may_take_what_another_one_takes() -> None:
+    pair = join("pair", {"left": tank, "right": tank}, links={"right.command": "left.command"})
+    assert pair.external == ("left.command",)
+    left, right = P.left, P.right._replace(delay=0.0)
+    numbers = pair.parameters(left=left, right=right)
+    command = np.sin(TIME)
+    run = simulate(Machine(pair, numbers), {"left.command": command}, RATE)
+    for side, own in (("left", left), ("right", right)):
+        alone = simulate(Machine(tank, own), {"command": command}, RATE)
+        assert np.array_equal(run[f"{side}.level"], alone["level"])
+    assert np.ptp(run["left.level"]) > 0.1
+
+
 def test_members_may_be_joined_models() -> None:
     fleet = join(
         "fleet",

@@ -16,12 +16,16 @@ from swashplate.cli.crane_options import (
     CraneArgument,
     Operated,
     Studied,
+    WithLoad,
     control_of,
     crane_of,
     named_numbers,
     number_of,
     sea_sentences,
 )
+from swashplate.cli.exports import ExportFiles
+from swashplate.cli.machines import OwnMachine
+from swashplate.cli.operating_points import answers_table, modes_table, outputs_named
 from swashplate.cli.options import (
     LOG_FORMATS,
     NO_VALUE,
@@ -30,13 +34,25 @@ from swashplate.cli.options import (
     TableFile,
     new_file,
 )
-from swashplate.cli.terminal import draw_figure, note, save, say, say_saved, show, side, spinner
+from swashplate.cli.terminal import (
+    check_writable,
+    draw_figure,
+    note,
+    save,
+    say,
+    say_saved,
+    show,
+    side,
+    spinner,
+)
 from swashplate.errors import InputError
 from swashplate.tables import PAGE, Column, Form, Table
 
 if TYPE_CHECKING:
     from swashplate.crane import Assessment, Crane, Operability, Seaway, Sweep
 
+LINEAR_OUTPUTS = ("off_lead", "side_lead", "rope", "body.slew", "boom")
+"""Signals of the linear crane unless others are named."""
 VERDICT = Form("a verdict", (".html", ".csv", ".parquet"))
 OPERABILITY = Form("an operability", (".html", ".csv", ".parquet"))
 LEAST_ALLOWED = 0.5
@@ -519,6 +535,127 @@ def damping(
     show(table)
     for sentence in free_swing.sentences():
         say(sentence)
+
+
+@command(
+    cranes,
+    "export",
+    examples="""
+        swashplate crane export tg3637 --fmu crane.fmu
+        swashplate crane export tg3637 --at rope_m=27 --c crane --compile
+        swashplate crane export mine.toml --drive luff=fitted --fmu crane.fmu --platforms linux64
+    """,
+    units=False,
+)
+def export_crane(
+    hanging: WithLoad,
+    files: ExportFiles,
+    *,
+    brake: Annotated[
+        bool,
+        typer.Option("--brake/--no-brake", metavar=NO_VALUE, help="Brake the hoist at rest."),
+    ] = True,
+) -> None:
+    """Export a crane with its drives as FMU, C source or WebAssembly.
+
+    Inputs are the voltages of the three drives and the ship's motion: surge,
+    sway, heave in m, roll, pitch, yaw in rad. Outputs are the signals of the
+    drives, and tip, load, hook, rope, swing and tension. It has no controller.
+    It is compiled when it is exported.
+    """
+    files.check(force=hanging.force)
+    with spinner("Exporting"):
+        from swashplate.crane import RATE, plant
+
+        crane = hanging.loaded_crane
+        machine = plant(crane, brake=brake, **hanging.run_options)
+    files.write(machine, 1.0 / RATE)
+    for sentence in crane.provenance():
+        say(sentence)
+
+
+@command(
+    cranes,
+    "linearize",
+    examples="""
+        swashplate crane linearize tg3637 --at rope_m=27
+        swashplate crane linearize tg3637 --voltage luff=4 --output off_lead --out crane.toml
+        swashplate crane linearize tg3637 --suspension hook=2000 --suspension sling=6
+    """,
+)
+def linearize_crane(
+    hanging: WithLoad,
+    *,
+    voltage: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="AXIS=V",
+            help="Constant voltage of a drive (default: 0, in its dead zone); may be repeated.",
+        ),
+    ] = None,
+    input: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="NAME",
+            help=(
+                "Input of the model, such as luff.voltage or roll (default: the three voltages); "
+                "may be repeated."
+            ),
+        ),
+    ] = None,
+    output: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="NAME",
+            help=(
+                "Signal of drives or crane (default: off_lead, side_lead, rope, slew and boom); "
+                "may be repeated."
+            ),
+        ),
+    ] = None,
+    frequency: Annotated[
+        float, typer.Option(metavar="HZ", help="Frequency at which gain and phase are printed.")
+    ] = 0.1,
+    out: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE", help="Write the model in SI units: .toml or .json."),
+    ] = None,
+) -> None:
+    """Linearise a crane with its drives, and show its modes and gains.
+
+    The load hangs at rest below the tip, and the drives run at constant voltages,
+    without the brake. Modes are those of the drives, whose lags follow from the
+    voltages, and of the load: along the boom and across it. The model is in steps
+    of 1/512 s and exact for small motions.
+    """
+    from swashplate.machine.linear import LINEAR_MODEL
+
+    check_writable(out, LINEAR_MODEL, force=hanging.force)
+    with spinner("Linearising"):
+        from swashplate.crane import RATE, plant
+        from swashplate.machine import linearize
+
+        crane = hanging.loaded_crane
+        machine = plant(crane, brake=False, **hanging.run_options)
+        own = OwnMachine(machine, crane.title or crane.name)
+        at = dict.fromkeys(own.needed, 0.0)
+        for axis, volts in named_numbers("--voltage", voltage, "luff=4", AXES).items():
+            at[f"{axis}.voltage"] = volts
+        inputs = input or [f"{axis}.voltage" for axis in AXES]
+        model = linearize(
+            machine,
+            at,
+            RATE,
+            inputs=[own.input_named(name) for name in inputs],
+            outputs=outputs_named(own, output or LINEAR_OUTPUTS),
+        )
+        tables = [modes_table(model, (*AXES, "body")), answers_table(own, model, frequency)]
+    save(out, "Model, in SI", model.write)
+    answered = {row.cells[0] for row in tables[1].rows}
+    still = [name for name in model.inputs if name not in answered]
+    none = f"No output answers {', '.join(still)}: a drive in its dead zone does not move."
+    sentences = [*([none] if still else []), *crane.provenance()]
+    _print_result(crane, [table for table in tables if table.rows], sentences)
 
 
 def _print_result(crane: Crane, tables: Iterable[Table], sentences: Iterable[str]) -> None:

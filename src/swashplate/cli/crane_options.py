@@ -75,6 +75,64 @@ class Placed:
 
 
 @dataclass(frozen=True)
+class WithLoad(Placed):
+    """A crane, and the load on its rope."""
+
+    load: Annotated[
+        float | None,
+        typer.Option(metavar="KG", help="Mass of the load (default: the crane's safe load)."),
+    ] = None
+    swing_damping: Annotated[
+        float | None,
+        typer.Option(
+            metavar="RATIO",
+            help="Damping ratio of the load's swing (default: the crane's; 0.005, assumed).",
+        ),
+    ] = None
+    suspension: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="NAME=VALUE",
+            help=(
+                "Property of the suspension: stiffness of the rope (EA) in N, such as "
+                "stiffness=6e7; bounce_damping, the damping ratio of an elastic rope; hook in kg; "
+                "sling in m; may be repeated."
+            ),
+        ),
+    ] = None
+    wind: Annotated[
+        str | None,
+        typer.Option(
+            metavar="FORWARD,PORT", help="Velocity of the air in m/s; requires --drag-area."
+        ),
+    ] = None
+    drag_area: Annotated[
+        float | None,
+        typer.Option(metavar="M2", help="Drag area of the load: drag coefficient times area."),
+    ] = None
+
+    @property
+    def run_options(self) -> dict[str, Any]:
+        """Pose of the crane at the start and load on its rope, as far as they are given."""
+        from swashplate.crane import Suspension
+
+        options = self.pose | _without_none(
+            drag_area=self.drag_area, load=self.load, swing_damping=self.swing_damping
+        )
+        names = [field.name for field in fields(Suspension)]
+        properties = named_numbers("--suspension", self.suspension, "stiffness=6e7", names)
+        if properties:
+            options["suspension"] = Suspension(**properties)
+        if self.wind is not None:
+            if self.drag_area is None:
+                raise InputError(
+                    f"--wind {self.wind} needs the load's drag area: give --drag-area, such as 12."
+                )
+            options["wind"] = _vector("--wind", self.wind, "10,-5")
+        return options
+
+
+@dataclass(frozen=True)
 class AtSea(Placed):
     """A crane on its ship in a sea."""
 
@@ -215,61 +273,8 @@ class AtSea(Placed):
 
 
 @dataclass(frozen=True)
-class Operated(AtSea):
+class Operated(WithLoad, AtSea):
     """A crane on its ship, and the load on its rope."""
-
-    load: Annotated[
-        float | None,
-        typer.Option(metavar="KG", help="Mass of the load (default: the crane's safe load)."),
-    ] = None
-    swing_damping: Annotated[
-        float | None,
-        typer.Option(
-            metavar="RATIO",
-            help="Damping ratio of the load's swing (default: the crane's; 0.005, assumed).",
-        ),
-    ] = None
-    suspension: Annotated[
-        list[str] | None,
-        typer.Option(
-            metavar="NAME=VALUE",
-            help=(
-                "Property of the suspension: stiffness of the rope (EA) in N, such as "
-                "stiffness=6e7; bounce_damping, the damping ratio of an elastic rope; hook in kg; "
-                "sling in m; may be repeated."
-            ),
-        ),
-    ] = None
-    wind: Annotated[
-        str | None,
-        typer.Option(
-            metavar="FORWARD,PORT", help="Velocity of the air in m/s; requires --drag-area."
-        ),
-    ] = None
-    drag_area: Annotated[
-        float | None,
-        typer.Option(metavar="M2", help="Drag area of the load: drag coefficient times area."),
-    ] = None
-
-    @property
-    def run_options(self) -> dict[str, Any]:
-        """Pose of the crane at the start and load on its rope, as far as they are given."""
-        from swashplate.crane import Suspension
-
-        options = self.pose | _without_none(
-            drag_area=self.drag_area, load=self.load, swing_damping=self.swing_damping
-        )
-        names = [field.name for field in fields(Suspension)]
-        properties = named_numbers("--suspension", self.suspension, "stiffness=6e7", names)
-        if properties:
-            options["suspension"] = Suspension(**properties)
-        if self.wind is not None:
-            if self.drag_area is None:
-                raise InputError(
-                    f"--wind {self.wind} needs the load's drag area: give --drag-area, such as 12."
-                )
-            options["wind"] = _vector("--wind", self.wind, "10,-5")
-        return options
 
 
 @dataclass(frozen=True)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import warnings
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
@@ -37,6 +38,83 @@ WASM = Form("WebAssembly", (".wasm",))
 app = typer.Typer(rich_markup_mode="rich")
 
 
+@dataclass(frozen=True)
+class ExportFiles:
+    """What is written of an exported machine, and how."""
+
+    fmu: Annotated[Path | None, new_file(FMU, "FMU for co-simulation.", metavar="FILE.fmu")] = None
+    c: Annotated[
+        Path | None,
+        new_folder("New or empty folder for C source with the machine's numbers.", "*"),
+    ] = None
+    wasm: Annotated[
+        Path | None,
+        new_file(WASM, "WebAssembly with the machine's numbers.", metavar="FILE.wasm"),
+    ] = None
+    fmi: Annotated[
+        Literal["2", "2.0", "3", "3.0"], typer.Option(help="FMI version of the FMU.")
+    ] = "2.0"
+    step: Annotated[
+        float | None,
+        typer.Option(
+            metavar="S",
+            help=(
+                "Internal step, of a drive at most 1/512 s; independent of the communication step "
+                "(default: 1/512 s, or the step that 'swashplate simulate' takes)."
+            ),
+        ),
+    ] = None
+    platforms: Annotated[
+        str | None,
+        typer.Option(
+            metavar="NAME,NAME",
+            help="Platforms of the FMU (default: all): linux64, aarch64-linux, win64, darwin64.",
+        ),
+    ] = None
+    compile: Annotated[
+        bool,
+        typer.Option(
+            "--compile", metavar=NO_VALUE, help="Also compile the C source for this machine."
+        ),
+    ] = False
+
+    def check(self, *, force: bool) -> None:
+        """Refuse options that contradict each other, and a folder that is not free."""
+        if self.fmu is None and self.c is None and self.wasm is None:
+            raise InputError("Choose what to export: --fmu FILE.fmu, --c DIR or --wasm FILE.wasm.")
+        if self.compile and self.c is None:
+            raise InputError("--compile compiles the C source; name its folder with --c DIR.")
+        if self.fmu is None and self.platforms is not None:
+            raise InputError("--platforms applies only to an FMU; name it with --fmu FILE.fmu.")
+        if self.c is not None:
+            check_folder(self.c)
+            check_free(self.c, force=force)
+
+    def write(self, machine: Drive | Machine, usual_step: float) -> None:
+        """Write a machine in steps of `usual_step` [s], unless others are stated."""
+        from swashplate import export as exporting
+
+        step = usual_step if self.step is None else self.step
+        platforms = self.platforms
+        names = None if platforms is None else [part.strip() for part in platforms.split(",")]
+        with texts_of_warnings():
+            if self.fmu is not None:
+                version: Literal["2.0", "3.0"] = "2.0" if self.fmi.startswith("2") else "3.0"
+                save(
+                    self.fmu,
+                    f"FMU {version}",
+                    lambda path: exporting.fmu(
+                        machine, path, fmi=version, step=step, platforms=names
+                    ),
+                )
+            if self.c is not None:
+                _export_c(machine, self.c, step, compile=self.compile)
+            if self.wasm is not None:
+                save(
+                    self.wasm, "WebAssembly", lambda path: exporting.wasm(machine, path, step=step)
+                )
+
+
 @command(
     app,
     "export",
@@ -49,85 +127,20 @@ app = typer.Typer(rich_markup_mode="rich")
         swashplate export valve.py --fmu valve.fmu --set gain=0.03
     """,
 )
-def export(
-    machine: MachineChoice,
-    *,
-    fmu: Annotated[Path | None, new_file(FMU, "FMU for co-simulation.", metavar="FILE.fmu")] = None,
-    c: Annotated[
-        Path | None,
-        new_folder("New or empty folder for C source with the machine's numbers.", "*"),
-    ] = None,
-    wasm: Annotated[
-        Path | None,
-        new_file(WASM, "WebAssembly with the machine's numbers.", metavar="FILE.wasm"),
-    ] = None,
-    fmi: Annotated[
-        Literal["2", "2.0", "3", "3.0"], typer.Option(help="FMI version of the FMU.")
-    ] = "2.0",
-    step: Annotated[
-        float | None,
-        typer.Option(
-            metavar="S",
-            help=(
-                "Internal step, of a drive at most 1/512 s; independent of the communication step "
-                "(default: 1/512 s, or the step that 'swashplate simulate' takes)."
-            ),
-        ),
-    ] = None,
-    platforms: Annotated[
-        str | None,
-        typer.Option(
-            metavar="NAME,NAME",
-            help="Platforms of the FMU (default: all): linux64, aarch64-linux, win64, darwin64.",
-        ),
-    ] = None,
-    compile: Annotated[
-        bool,
-        typer.Option(
-            "--compile", metavar=NO_VALUE, help="Also compile the C source for this machine."
-        ),
-    ] = False,
-    force: Force = False,
-) -> None:
+def export(machine: MachineChoice, files: ExportFiles, *, force: Force = False) -> None:
     """Export a drive, or a machine of your own, as FMU, C source or WebAssembly.
 
     An FMU of a drive needs no Python and no compiler, neither to write it nor to
     run it: the package contains its libraries. A machine of your own is compiled
     when it is exported.
     """
-    if fmu is None and c is None and wasm is None:
-        raise InputError("Choose what to export: --fmu FILE.fmu, --c DIR or --wasm FILE.wasm.")
-    if compile and c is None:
-        raise InputError("--compile compiles the C source; name its folder with --c DIR.")
-    if fmu is None and platforms is not None:
-        raise InputError("--platforms applies only to an FMU; name it with --fmu FILE.fmu.")
-    if c is not None:
-        check_folder(c)
-        check_free(c, force=force)
+    files.check(force=force)
     with spinner("Exporting"):
         from swashplate import export as exporting
 
         own = machine.own
         exported = machine.loaded_drive if own is None else own.machine
-    usual_step = exporting.LONGEST_STEP if own is None else 1.0 / own.steps_a_second()
-    longest_step = usual_step if step is None else step
-    names = None if platforms is None else [part.strip() for part in platforms.split(",")]
-    with texts_of_warnings():
-        if fmu is not None:
-            version: Literal["2.0", "3.0"] = "2.0" if fmi.startswith("2") else "3.0"
-            save(
-                fmu,
-                f"FMU {version}",
-                lambda path: exporting.fmu(
-                    exported, path, fmi=version, step=longest_step, platforms=names
-                ),
-            )
-        if c is not None:
-            _export_c(exported, c, longest_step, compile=compile)
-        if wasm is not None:
-            save(
-                wasm, "WebAssembly", lambda path: exporting.wasm(exported, path, step=longest_step)
-            )
+    files.write(exported, exporting.LONGEST_STEP if own is None else 1.0 / own.steps_a_second())
     machine.warn()
     for line in machine.changes:
         note(line)

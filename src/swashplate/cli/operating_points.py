@@ -20,6 +20,10 @@ if TYPE_CHECKING:
     Array = NDArray[np.float64]
 AT_ZERO = 1e-9
 """Size of a sampled pole, or distance of it from 1, that counts as 0. [1]"""
+ROUNDED = 1e-8
+"""Part of the largest answer to an input below which another one is rounding. [1]"""
+GONE, INTEGRATES = 1e-3, 1e-6
+"""The same of poles of several, which differ by roots of rounding: three at 0 by 1e-5. [1]"""
 
 
 def operating_point(own: OwnMachine, at: Mapping[str, float], rate: float) -> SettledPoint:
@@ -104,36 +108,61 @@ def _point_table(own: OwnMachine, at: Mapping[str, float], point: SettledPoint) 
 
 
 def _gains_table(own: OwnMachine, model: LinearModel, frequency: float) -> Table:
-    import numpy as np
-
     at = f"at {frequency:g} Hz"
     columns = (
         Column("from"),
         Column("to"),
         Column("steady gain", ".5g", none="integrates"),
-        Column(f"gain {at}", ".5g"),
-        Column("unit"),
-        Column(f"phase {at}", ".2f", "rad"),
+        *_answer_columns(at),
     )
     table = Table("", columns)
+    for name in model.inputs:
+        steady = model.response([0.0], name)[:, 0].real
+        answers = _answers(own, model, name, frequency)
+        for output, gain, answer in zip(model.outputs, steady, answers, strict=True):
+            table.add(name, output, float(gain) if abs(gain) < inf else None, *answer)
+    return without_empty(table)
+
+
+def answers_table(own: OwnMachine, model: LinearModel, frequency: float) -> Table:
+    """Gain and phase of each output that answers each input at a frequency [Hz].
+
+    The steady gain of a machine with several states that integrate cannot be computed.
+    """
+    table = Table("", (Column("from"), Column("to"), *_answer_columns(f"at {frequency:g} Hz")))
+    for name in model.inputs:
+        answers = _answers(own, model, name, frequency)
+        least = ROUNDED * max(gain for gain, _, _ in answers)
+        for output, answer in zip(model.outputs, answers, strict=True):
+            if answer[0] > least:
+                table.add(name, output, *answer)
+    return without_empty(table)
+
+
+def _answer_columns(at: str) -> tuple[Column, ...]:
+    return (Column(f"gain {at}", ".5g"), Column("unit"), Column(f"phase {at}", ".2f", "rad"))
+
+
+def _answers(
+    own: OwnMachine, model: LinearModel, name: str, frequency: float
+) -> list[tuple[float, str, float | None]]:
+    """Gain, unit and phase [rad] of each output for an input at a frequency [Hz]."""
+    import numpy as np
+
     if model.rate is not None and not 0.0 <= frequency <= 0.5 * model.rate:
         raise InputError(
             f"--frequency is {frequency:g} Hz, but must be from 0 to half the rate, "
             f"{0.5 * model.rate:g} Hz."
         )
-    for name in model.inputs:
-        steady = model.response([0.0], name)[:, 0].real
-        answers = model.response([frequency], name)[:, 0]
-        for output, gain, answer in zip(model.outputs, steady, answers, strict=True):
-            table.add(
-                name,
-                output,
-                float(gain) if abs(gain) < inf else None,
-                float(abs(answer)),
-                _gain_unit(own.unit(output), own.unit(name)),
-                float(np.angle(answer)) if abs(answer) > 0.0 else None,
-            )
-    return without_empty(table)
+    answers = model.response([frequency], name)[:, 0]
+    return [
+        (
+            float(abs(answer)),
+            _gain_unit(own.unit(output), own.unit(name)),
+            float(np.angle(answer)) if abs(answer) > 0.0 else None,
+        )
+        for output, answer in zip(model.outputs, answers, strict=True)
+    ]
 
 
 def _gain_unit(output: str, input: str) -> str:
@@ -172,4 +201,35 @@ def poles_table(model: LinearModel) -> Table:
         table.add("rad/s", real, imaginary, size / (2.0 * pi), (0.0 - real) / size)
     if ended.any():
         table.caption = f"{count(int(ended.sum()), 'pole')} more at z = 0: gone after one step"
+    return table
+
+
+def modes_table(model: LinearModel, members: Sequence[str]) -> Table:
+    """Modes of the members of a joined machine, of two conjugate poles the upper one.
+
+    Members act on those after them alone, so that the poles of each are its own.
+    """
+    import numpy as np
+
+    columns = (
+        Column("Mode of"),
+        Column("real", ".5g"),
+        Column("imaginary", "s"),
+        Column("unit"),
+        Column("Hz", ".4g"),
+        Column("damping", ".4f"),
+    )
+    table = Table("", columns)
+    others = 0
+    for member in members:
+        poles = model.poles_of(*[name for name in model.states if name.startswith(f"{member}.")])
+        moving = (np.abs(poles) >= GONE) & (np.abs(poles - 1.0) >= INTEGRATES)
+        others += int((~moving).sum())
+        for pole in poles[moving & (poles.imag >= 0.0)]:
+            s = np.log(pole) * (model.rate or 1.0)
+            size = float(abs(s))
+            imaginary = f"±{s.imag:.5g}" if s.imag else ""
+            frequency = size / (2.0 * pi)
+            table.add(member, float(s.real), imaginary, "rad/s", frequency, -float(s.real) / size)
+    table.caption = f"{count(others, 'pole')} more: gone within a few steps, or integrate"
     return table

@@ -16,7 +16,9 @@ from .drives import DriveSource as DriveSource
 from .free_swing import FreeSwing as FreeSwing
 from .free_swing import swing_damping as swing_damping
 from .limits import LIMITED as LIMITED
-from .linear_crane import linearize as linearize
+from .machines import Placing as Placing
+from .machines import body as body
+from .machines import plant as plant
 from .rope import LoadMotion as LoadMotion
 from .rope import Suspension as Suspension
 from .rope import load_motion as load_motion

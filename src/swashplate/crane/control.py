@@ -6,8 +6,8 @@ of the tip (feedback, ship, user-defined), clip, inverse kinematics, position lo
 works on the path of the tip, and brings a position loop of 0.7 /s with it, by which the shafts
 follow that path; `PositionLoop` sets another gain. A `Crew` is no such stage: its hand is at the
 joysticks, before all others. `Sensors` says how well control sees the crane; without sensors it
-sees the true signals. The linear crane, `linearize`, is for controllers that are
-designed outside the package.
+sees the true signals. For controllers that are designed outside the package `swashplate.linearize`
+takes the crane as a machine, `swashplate.crane.plant`, or its `body` alone.
 """
 
 from __future__ import annotations

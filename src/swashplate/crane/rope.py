@@ -14,14 +14,14 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from math import atan2, cos, inf, isfinite, pi, sin, sqrt
-from typing import NamedTuple
+from typing import Annotated, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from swashplate.crane.kinematics import Vector, add_scaled, dot, norm, rotation, to_ship, vector_of
 from swashplate.errors import InputError
-from swashplate.machine import equation, kernel
+from swashplate.machine import Definition, equation, kernel
 from swashplate.results import Result
 
 Array = NDArray[np.float64]
@@ -319,10 +319,14 @@ def rope_step(
 class Start(NamedTuple):
     """Initial offset and velocity of the load relative to the tip, horizontal and inertial."""
 
-    offset: tuple[float, float] = (0.0, 0.0)
-    """[m]"""
-    velocity: tuple[float, float] = (0.0, 0.0)
-    """[m/s]"""
+    offset_x: Annotated[float, Definition("load ahead of the tip at the start", "m")] = 0.0
+    offset_y: Annotated[float, Definition("load to port of the tip at the start", "m")] = 0.0
+    velocity_x: Annotated[float, Definition("velocity of the load forward at the start", "m/s")] = (
+        0.0
+    )
+    velocity_y: Annotated[float, Definition("velocity of the load to port at the start", "m/s")] = (
+        0.0
+    )
 
 
 @equation

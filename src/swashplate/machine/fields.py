@@ -255,13 +255,17 @@ def numbers_of(value: Any) -> list[float]:
     return numbers
 
 
+_types_of: Callable[[Any], dict[str, Any]] = cache(get_type_hints)
+"""Types of the fields of a named tuple, by name."""
+
+
 def defaults_of(kind: Any) -> dict[str, float]:
     """Defaults of a nested named tuple's numbers by path, as far as there are some.
 
     The default of a field that is a tuple counts before those of the tuple's own fields.
     """
     defaults: dict[str, float] = {}
-    hints = get_type_hints(kind)
+    hints = _types_of(kind)
     for name in kind._fields:
         default = kind._field_defaults.get(name)
         if is_named_tuple(hints[name]):
@@ -282,7 +286,7 @@ def tuple_from(kind: Any, numbers: Mapping[str, float]) -> Any:
 
 def nested_from(kind: Any, values_by_path: Mapping[str, Any], prefix: str = "") -> Any:
     """A nested named tuple from values by path, numbers or arrays; `prefix` is left out of it."""
-    hints = get_type_hints(kind)
+    hints = _types_of(kind)
     values = [
         nested_from(hints[name], values_by_path, f"{prefix}{name}.")
         if is_named_tuple(hints[name])

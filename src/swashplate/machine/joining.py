@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
+from functools import lru_cache
 from typing import Any, NamedTuple, overload
 
 from swashplate.errors import InputError
@@ -64,8 +65,8 @@ def join(
         the whole is a machine with their numbers.
     links : mapping of str, optional
         What an input takes, by its path, such as ``{"load.pull": "winch.shaft_torque"}``: a signal,
-        an equation over the signals that its arguments name, or a tuple of an equation and the
-        paths of its signals. Any other name becomes a further signal.
+        another input, an equation over the signals that its arguments name, or a tuple of an
+        equation and the paths of its signals. Any other name becomes a further signal.
     **changes
         `integrals`, `outputs`, `free_start`, `replacements` of the whole. Members keep theirs.
 
@@ -97,18 +98,50 @@ def join(
     ('port.voltage', 4)
     """
     members, machines = _members(name, models)
+    wires = tuple((links or {}).items())
+    try:
+        model = _joined_once(name, tuple(members), wires, tuple(changes.items()))
+    except TypeError:  # something of a list or a mapping, which has no hash
+        model = _joined(name, members, dict(wires), changes)
+    if not machines:
+        return model
+    numbers = tuple(part for machine in machines.values() for part in machine.parts)
+    rules = tuple(
+        each._replace(member=_path(key, each.member))
+        for key, machine in machines.items()
+        for each in machine.rules
+    )
+    return Machine.of_parts(model, numbers, name, rules)
+
+
+@lru_cache(maxsize=64)
+def _joined_once(
+    name: str,
+    members: tuple[tuple[str, Model], ...],
+    wires: tuple[tuple[str, Wire], ...],
+    changes: tuple[tuple[str, Any], ...],
+) -> Model:
+    """The same model again if the same ones are joined in the same way."""
+    return _joined(name, members, dict(wires), dict(changes))
+
+
+def _joined(
+    name: str, members: Members, links: Mapping[str, Wire], changes: dict[str, Any]
+) -> Model:
+    """A model of members."""
     parts = [part for key, model in members for part in _placed(key, model)]
     places = [part.path for part in parts]
     if len(set(places)) != len(places):
         raise InputError(f"Joined models need different names, not {', '.join(places)}.")
     linked = dict(_links_within(members))
-    for wanted, wire in (links or {}).items():
+    for wanted, wire in links.items():
         inputs = [part.tap(each).signal for part in parts for each in part.input_types]
         at = full_name(wanted, inputs)
         if isinstance(wire, str):
             if at not in inputs:
                 raise InputError(f"Model {name}: there is no input {near_names(wanted, inputs)}.")
-            parts = [_wired(part, at, _signal(name, parts, linked, wire)) for part in parts]
+            source = _signal(name, parts, linked, wire, [each for each in inputs if each != at])
+            parts = [_wired(part, at, source) for part in parts]
         else:
             linked[at] = _link(name, at, parts, wire)
 
@@ -125,21 +158,13 @@ def join(
     model = Model(name, step=parts[0].step, parts=tuple(parts), links=linked, **kinds, **changes)
     for wrong in _too_late(model):
         raise InputError(wrong)
-    if not machines:
-        return model
-    numbers = tuple(part for machine in machines.values() for part in machine.parts)
-    rules = tuple(
-        each._replace(member=_path(key, each.member))
-        for key, machine in machines.items()
-        for each in machine.rules
-    )
-    return Machine.of_parts(model, numbers, name, rules)
+    return model
 
 
 # --- members --------------------------------------------------------------------------------------
 
 
-Members = list[tuple[str, Model]]
+Members = Sequence[tuple[str, Model]]
 """Models with their names, which are empty in series."""
 
 
@@ -223,15 +248,20 @@ def _wired(part: Model, at: str, signal: str) -> Model:
     return replace(part, parts=(), wired={**part.wired, **dict.fromkeys(inputs, signal)})
 
 
-def _signal(name: str, parts: Sequence[Model], links: Mapping[str, Link], wanted: str) -> str:
-    """Full name of a signal of some parts, or of a link."""
-    signals = [part.full(each) for part in parts for each in part.signal_names]
-    found = full_name(wanted, [*links, *signals])
-    if found not in (*links, *signals):
-        raise InputError(
-            f"Model {name}: there is no signal {near_names(wanted, [*links, *signals])}."
-        )
-    return found
+def _signal(
+    name: str,
+    parts: Sequence[Model],
+    links: Mapping[str, Link],
+    wanted: str,
+    inputs: Sequence[str] = (),
+) -> str:
+    """Full name of a signal of some parts, of a link or, if there is none, of some inputs."""
+    signals = [*links, *(part.full(each) for part in parts for each in part.signal_names)]
+    for names in (signals, inputs):
+        found = full_name(wanted, names)
+        if found in names:
+            return found
+    raise InputError(f"Model {name}: there is no signal {near_names(wanted, signals)}.")
 
 
 def _link(name: str, at: str, parts: Sequence[Model], wire: Any) -> Link:

@@ -332,12 +332,24 @@ class Model:
 
     def link_of(self, part: int, name: str) -> Link | None:
         """Where an input of a part comes from, None if from outside."""
-        signal = self.parts[part].tap(name).signal
-        link = self.links.get(signal)
-        if link is not None and link.after < part:
-            return link
-        source = source_of(self.parts[:part], signal)
-        return Link(signal, (source,)) if source else None
+        return self._links_of[part, name]
+
+    @cached_property
+    def _links_of(self) -> dict[tuple[int, str], Link | None]:
+        """Where each input of each part comes from, None if from outside."""
+        found = dict[tuple[int, str], Link | None]()
+        before = dict[str, SignalSource]()
+        for index, part in enumerate(self.parts):
+            for name in part.input_types:
+                signal = part.tap(name).signal
+                link = self.links.get(signal)
+                if link is None or link.after >= index:
+                    source = before.get(signal)
+                    link = Link(signal, (source,)) if source else None
+                found[index, name] = link
+            for name in part.signal_names:
+                before[part.full(name)] = SignalSource(index, name)
+        return found
 
     def prefix(self, part: int) -> str:
         """What stands before a part's paths: where it stands and a dot, in a joined model."""

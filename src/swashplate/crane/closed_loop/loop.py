@@ -33,24 +33,20 @@ from swashplate.crane.kinematics import (
     Vector,
     add_scaled,
     boom_at,
-    norm,
     reach_rate,
     rope_length,
     rotation,
-    shaft_torques,
     shafts_for,
     tip_of,
     to_inertial,
     to_ship,
 )
+from swashplate.crane.motion import BrakeState, braked, led_load, rope_torques
 from swashplate.crane.rope import (
     GRAVITY,
     Hanging,
     Hung,
     Start,
-    hanging_load,
-    rope_step,
-    set_off,
 )
 from swashplate.machine import equation, inlined, kernel
 from swashplate.machine.marching import StepContext, step
@@ -66,8 +62,6 @@ FINE, TOO_FAST, BOOM_OUT, ROPE_OUT, NO_NUMBER = range(5)
 ANGLE, SHAFT_SPEED, OPERATOR_ANGLE, OPERATOR_SPEED, REFERENCE_ANGLE, TORQUE = range(6)
 """Shafts' angles and speeds; angles to which only the stick would have brought them, and its
 speeds; reference angles of control; torques of the rope. [rad], [rad/s], [N m]"""
-BRAKE_WAITS, BRAKE_TAKES = 0.3, 0.2
-"""Time at rest before the hoist's brake falls in, and time in which it stops the drum. [s]"""
 PATH, SWING = 0, 2
 """Rows of the memory of delayed signals, of each its x and y."""
 ROUNDING = 1e-9
@@ -141,10 +135,7 @@ class State(NamedTuple):
     """(6, 3) of hoist, slew and luff: rows `ANGLE` to `TORQUE`."""
     tip: Vector
     hung: Hung
-    rest_time: float
-    """Time for which the hoist's command has been within the dead zone. [s]"""
-    brake: float
-    """Share by which the brake has fallen in, 0 to 1."""
+    brake: BrakeState
 
 
 class Seen(NamedTuple):
@@ -387,54 +378,6 @@ def limited(u: float, inverse: Inverse) -> float:
 
 
 @inlined
-def braked(
-    volts: float, rest_time: float, brake: float, h: float, inverse: Inverse
-) -> tuple[float, float]:
-    """Time for which the hoist's command has been in its dead zone, and how far the brake is in."""
-    gap = inverse.gap
-    is_in_dead_zone = inverse.voltage[gap] < volts < inverse.voltage[gap + 1]
-    rest_time = rest_time + h if is_in_dead_zone else 0.0
-    change = h / BRAKE_TAKES if rest_time >= BRAKE_WAITS else -h / BRAKE_TAKES
-    return rest_time, min(max(brake + change, 0.0), 1.0)
-
-
-@inlined
-def led_load(
-    hung: Hung,
-    tip: Vector,
-    next_tip: Vector,
-    rope: float,
-    previous_rope: float,
-    sample: int,
-    h: float,
-    fixed: Fixed,
-) -> Hung:
-    """Load and hook after the tip has moved and the rope has changed its length. [m]"""
-    s = fixed.hanging
-    start = fixed.start
-    if sample == 0:
-        return hanging_load(next_tip, start.offset[0], start.offset[1], rope, s)
-    square = h * h
-    if sample == 1:
-        square = 0.5 * square
-        tip_step = add_scaled(next_tip, -1.0, tip)
-        v = start.velocity
-        hung = set_off(hung, tip, tip_step, rope - previous_rope, v[0], v[1], h)
-    return rope_step(hung, tip, next_tip, rope, s, h, square)
-
-
-@inlined
-def rope_torques(
-    hung: Hung, tip: Vector, r: Rotation, slew: float, boom: Boom, fixed: Fixed
-) -> Shafts:
-    """Torques of the rope's tension on the three shafts. [N m]"""
-    tension = fixed.mass * hung.pull
-    along = add_scaled(hung.hook, -1.0, tip)
-    force = add_scaled(Vector(0.0, 0.0, 0.0), tension / norm(along), along)
-    return shaft_torques(to_ship(r, force), slew, boom, tension, fixed.geometry)
-
-
-@inlined
 def store(
     row: Array,
     volts: Array,
@@ -504,7 +447,7 @@ def advance_crane(
         Drivable(inverses[2].low, inverses[2].high, inverses[2].acceleration),
     )
     moving = ship.shape[1] > 1
-    sample, axes, tip, hung, rest_time, brake = state
+    sample, axes, tip, hung, brake = state
     shafts = shafts_of(axes, ANGLE)
     boom = boom_at(shafts.luff, g, home)
     rope = rope_length(shafts, g, home)
@@ -598,8 +541,10 @@ def advance_crane(
             omega[0], omega[1], omega[2] = a.outputs[0], b.outputs[0], c.outputs[0]
             limits[0], limits[1], limits[2] = a.outputs[1], b.outputs[1], c.outputs[1]
         if fixed.brake and actuation != IDEAL:
-            rest_time, brake = braked(volts[0], rest_time, brake, h, inverses[0])
-            omega[0] = omega[0] * (1.0 - brake)
+            gap = inverses[0].gap
+            edges = inverses[0].voltage
+            brake = braked(brake, volts[0], edges[gap], edges[gap + 1], h)
+            omega[0] = omega[0] * (1.0 - brake.share)
         # 4. kinematics and rope
         advance(axes, ANGLE, SHAFT_SPEED, omega, h, sample > 0)
         shafts = shafts_of(axes, ANGLE)
@@ -613,14 +558,25 @@ def advance_crane(
         if not (fixed.boom[0] <= boom.sin <= fixed.boom[1] and boom.cos > 0.0):
             ended = BOOM_OUT
             break
-        hung = led_load(hung, tip, following, rope, previous_rope, sample, h, fixed)
+        hung = led_load(
+            hung,
+            tip,
+            following,
+            rope,
+            previous_rope,
+            float(sample),
+            fixed.start,
+            fixed.hanging,
+            h,
+        )
         if hung.pull < 0.0:
             ended = TOO_FAST
             break
         tip = following
         store(out[m], volts, omega, limits, axes, tip, hung, columns)
         if loaded:
-            torques = rope_torques(hung, tip, r, home.slew + shafts.slew, boom, fixed)
+            slew = home.slew + shafts.slew
+            torques = rope_torques(hung, tip, r, slew, boom, fixed.mass, g)
             axes[TORQUE, 0], axes[TORQUE, 1], axes[TORQUE, 2] = torques
         sample += 1
-    return State(sample, axes, tip, hung, rest_time, brake), ended
+    return State(sample, axes, tip, hung, brake), ended

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 from functools import lru_cache
-from math import degrees, hypot, inf, isfinite, pi, sin, sqrt
-from numbers import Real
-from typing import Any, Literal, TypedDict, Unpack, get_args
+from math import degrees, pi, sqrt
+from typing import Any, Literal, Unpack, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -19,15 +18,9 @@ from swashplate.crane.control import GIVES, SEEN, Control, stages_of
 from swashplate.crane.crane import Crane
 from swashplate.crane.crew import new_memory
 from swashplate.crane.kinematics import Shafts, Vector, boom_at, rope_length, shaft_torques, tip_of
-from swashplate.crane.rope import (
-    AIR,
-    GRAVITY,
-    Start,
-    Suspension,
-    hanging_load,
-    swing_of,
-    too_fast_sentence,
-)
+from swashplate.crane.machines import Placing, body_numbers
+from swashplate.crane.motion import Body, BrakeState
+from swashplate.crane.rope import GRAVITY, hanging_load, swing_of, too_fast_sentence
 from swashplate.drive import Drive
 from swashplate.errors import DomainError, InputError
 from swashplate.machine import Machine
@@ -40,21 +33,15 @@ ACTUATIONS: tuple[str, ...] = get_args(Actuation)
 """In the order of `loop.IDEAL` and the others."""
 OUTPUTS = ("shaft_speed", "limits")
 """Signals of each drive that the loop uses."""
-RIGID = Suspension()
-"""A point on a rigid rope."""
-WIDEST, STRONGEST = 1e5, 100.0
-"""Largest drag area of a load, and largest wind; gusts of hurricanes have 100 m/s. [m²], [m/s]"""
-FARTHEST = 0.9
-"""Largest offset of the load at the start, as a part of the rope: at 64 degrees."""
-FASTEST_START = 100.0
-"""Largest velocity of the load at the start. [m/s]"""
 QUICKEST = 0.4
 """Largest part of a rope's pull by which a leaking drive may lower it within a sample: at 0.7 they
 would swing against each other from sample to sample."""
 
 
-class RunOptions(TypedDict, total=False):
+class RunOptions(Placing, total=False):
     """Options of a run: keywords of `simulate` and `CraneStepper`, each optional.
+
+    Those of `Placing` say where the crane begins and what hangs on it; these what moves it.
 
     Parameters
     ----------
@@ -64,32 +51,11 @@ class RunOptions(TypedDict, total=False):
         What turns reference speeds into speeds: the real drives after their inverse maps, or
         after 10 V for full speed (``"volts"``); or drives that follow instantaneously within their
         limits of speed (``"ideal"``). A stepper also takes voltages (``"direct"``).
-    slew_deg : float, default 0, in studies 90
-        From forward to starboard.
-    boom_deg : float, default 45
-        The boom's elevation.
-    rope_m : float, default 20, in studies 27
-        Rope below the tip.
-    load : float, default the crane's safe load, which is also the largest
-        Its mass. [kg]
-    suspension : Suspension, default a point on a rigid rope
-        Elastic rope, hook with slings.
-    swing_damping : float, default the crane's
-        Damping ratio of the load's swing by air, sheaves and rope, 0 to 0.2.
-    load_offset : (float, float), default (0, 0)
-        Load less tip at the start, forward and to port, inertial: the load begins there, on its
-        taut rope; shorter than 0.9 of the rope. [m]
-    load_velocity : (float, float), default (0, 0)
-        Of the load relative to the tip at the start, horizontal, likewise. [m/s]
     loaded : bool, default whether a real drive of the crane feels a load
         Whether the rope loads the drives: its tension is a torque on each shaft, by virtual work,
         which they take a sample later as their ``load_torque``. Drives feel it by their
         ``motor_leakage`` and ``line_stiffness``, which the packaged ones do not have: their tests
         were without load. What the boom weighs is not in it.
-    drag_area : float, default 0
-        C_d A of the load, at most 100 000. [m²]
-    wind : (float, float), default (0, 0)
-        Forward and to port, within 100 on each axis. [m/s]
     brake : bool, default True
         Whether a brake holds the hoist 0.3 s after its voltage has come into the dead zone. A
         voltage at its edge keeps the brake open.
@@ -97,17 +63,7 @@ class RunOptions(TypedDict, total=False):
 
     control: Control | None
     actuation: Actuation
-    slew_deg: float
-    boom_deg: float
-    rope_m: float
-    load: float | None
-    suspension: Suspension
-    swing_damping: float | None
-    load_offset: tuple[float, float]
-    load_velocity: tuple[float, float]
     loaded: bool | None
-    drag_area: float
-    wind: tuple[float, float]
     brake: bool
 
 
@@ -167,9 +123,9 @@ class CraneStepper:
             weight = fixed.mass * GRAVITY
             axes[loop.TORQUE] = shaft_torques(Vector(0.0, 0.0, -weight), home.slew, boom, weight, g)
         rope = float(rope_length(Shafts(0.0, 0.0, 0.0), g, home))
-        offset_x, offset_y = fixed.start.offset
-        hung = hanging_load(tip, offset_x, offset_y, rope, fixed.hanging)
-        self._state = State(0, axes, tip, hung, 0.0, 0.0)
+        start = fixed.start
+        hung = hanging_load(tip, start.offset_x, start.offset_y, rope, fixed.hanging)
+        self._state = State(0, axes, tip, hung, BrakeState())
         longest = 2.0 * pi * sqrt(fixed.ropes[1] / GRAVITY) * RATE + 4.0
         memory = np.zeros((4, 1 << int(longest).bit_length()))
         memory[loop.PATH : loop.PATH + 2] = [[tip.x], [tip.y]]
@@ -331,107 +287,42 @@ def _fixed(
     settings: Any,
     *,
     actuation: Actuation = "inverse",
-    slew_deg: float = 0.0,
-    boom_deg: float = 45.0,
-    rope_m: float = 20.0,
-    load: float | None = None,
-    suspension: Suspension = RIGID,
-    swing_damping: float | None = None,
-    load_offset: tuple[float, float] = (0.0, 0.0),
-    load_velocity: tuple[float, float] = (0.0, 0.0),
     loaded: bool | None = None,
-    drag_area: float = 0.0,
-    wind: tuple[float, float] = (0.0, 0.0),
     brake: bool = True,
+    **placing: Unpack[Placing],
 ) -> Fixed:
     """Check the options of a run, `RunOptions`, and make its constants of them."""
     if actuation not in ACTUATIONS:
         raise InputError(f"actuation is '{actuation}'; it is {', '.join(ACTUATIONS[:-1])}.")
-    load = crane.safe_load if load is None else load
-    swing_damping = crane.swing_damping if swing_damping is None else swing_damping
-    numbers = {
-        "slew_deg": slew_deg,
-        "boom_deg": boom_deg,
-        "rope_m": rope_m,
-        "load": load,
-        "drag_area": drag_area,
-        "swing_damping": swing_damping,
-    }
-    for name, value in numbers.items():
-        if not isinstance(value, Real):
-            raise InputError(f"{name} is {value!r}, but must be a number.")
-    if not 0.0 <= drag_area <= WIDEST:
-        raise InputError(
-            f"drag_area is {drag_area:g} m², but must be at least 0 and at most {WIDEST:g} m²."
-        )
-    if not isinstance(suspension, Suspension):
-        raise InputError(f"suspension is {suspension!r}, but must be a Suspension.")
-    wind = _pair("wind", wind, "two speeds, forward and to port, in m/s")
-    if max(map(abs, wind)) > STRONGEST:
-        raise InputError(f"wind is {wind!r}, but must be within {STRONGEST:g} m/s on each axis.")
-    offset = _pair("load_offset", load_offset, "two lengths, forward and to port, in m")
-    offset_x, offset_y = offset
-    distance = hypot(offset_x, offset_y)
-    if not distance < FARTHEST * rope_m:
-        raise InputError(
-            f"load_offset is {distance:.4g} m long, but must be shorter than {FARTHEST:g} of "
-            f"the rope of {rope_m:g} m."
-        )
-    velocity = _pair("load_velocity", load_velocity, "two speeds, forward and to port, in m/s")
-    if max(map(abs, velocity)) > FASTEST_START:
-        raise InputError(
-            f"load_velocity is {velocity!r}, but must be within {FASTEST_START:g} m/s on each axis."
-        )
-    if load > crane.safe_load:
-        raise InputError(
-            f"The load is {load:g} kg, but {crane.name} lifts {crane.safe_load:g} kg: use a "
-            "smaller load, or a crane with another safe_load."
-        )
-    # the suspension refuses a load of 0
-    drag = AIR * drag_area / (2.0 * load) if load > 0.0 else 0.0
+    numbers = body_numbers(crane, **placing)
     if loaded is None:
         loaded = actuation != "ideal" and feels_load(crane)
     if loaded:
-        _check_loaded(crane, actuation, load + suspension.hook, suspension)
-    low, high = crane.boom_limits
+        _check_loaded(crane, actuation, numbers)
     hoist, slew, luff = (_inverse(crane.inverse(axis)) for axis in AXES)
-    home = crane.home(slew_deg, boom_deg, rope_m)
-    hanging = suspension.hanging(
-        load,
-        shortest=crane.rope_limits[0],
-        rate=RATE,
-        drag=drag,
-        wind=(*wind, 0.0),
-        swing_damping=swing_damping,
-    )
+    travel = numbers.travel
     return Fixed(
-        geometry=crane.geometry,
-        home=home,
+        geometry=numbers.geometry,
+        home=numbers.home,
         settings=settings,
         actuation=ACTUATIONS.index(actuation),
         brake=bool(brake),
-        boom=(sin(low), sin(high)),
-        ropes=crane.rope_limits,
-        mass=load + suspension.hook,
-        hanging=hanging,
-        start=Start(offset, velocity),
+        boom=(travel.lowest, travel.highest),
+        ropes=(travel.shortest, travel.longest),
+        mass=numbers.mass,
+        hanging=numbers.hanging,
+        start=numbers.start,
         loaded=bool(loaded),
         inverses=(hoist, slew, luff),
         columns=columns_of(
-            ideal=actuation == "ideal", hooked=suspension.hook > 0.0, loaded=bool(loaded)
+            ideal=actuation == "ideal",
+            hooked=numbers.hanging.sling > 0.0,
+            loaded=bool(loaded),
         ),
     )
 
 
-def _pair(name: str, value: Any, what: str) -> tuple[float, float]:
-    """Two finite numbers; an `InputError` that says what they are."""
-    pair = np.array(value, dtype=object)
-    if pair.shape != (2,) or not all(isinstance(part, Real) and isfinite(part) for part in pair):
-        raise InputError(f"{name} is {value!r}, but must be {what}.")
-    return float(pair[0]), float(pair[1])
-
-
-def _check_loaded(crane: Crane, actuation: str, mass: float, suspension: Suspension) -> None:
+def _check_loaded(crane: Crane, actuation: str, numbers: Body) -> None:
     """Refuse loads on drives that feel none, or that answer them faster than a sample."""
     if actuation == "ideal":
         raise InputError(
@@ -444,12 +335,12 @@ def _check_loaded(crane: Crane, actuation: str, mass: float, suspension: Suspens
             "line_stiffness, as crane.hoist.replace(motor_leakage=1e-6), or leave out 'loaded'."
         )
     for axis, arm in (("hoist", crane.geometry.hoist), ("luff", crane.geometry.luff)):
-        gives = 0.5 * RATE * mass * arm * arm * lost[axis]
-        if suspension.stiffness == inf and gives > QUICKEST:
+        gives = 0.5 * RATE * numbers.mass * arm * arm * lost[axis]
+        if not numbers.hanging.stiffness > 0.0 and gives > QUICKEST:
             raise InputError(
-                f"The {axis} of {crane.name} gives way to {mass:g} kg on a rigid rope within a "
-                f"sample, since its motor_leakage costs {lost[axis]:.3g} rad/s per N m: use an "
-                "elastic rope, suspension=Suspension(stiffness=6e7)."
+                f"The {axis} of {crane.name} gives way to {numbers.mass:g} kg on a rigid rope "
+                f"within a sample, since its motor_leakage costs {lost[axis]:.3g} rad/s per N m: "
+                "use an elastic rope, suspension=Suspension(stiffness=6e7)."
             )
 
 

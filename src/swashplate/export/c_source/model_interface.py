@@ -24,6 +24,8 @@ from swashplate.machine.code_generation import (
 )
 
 TEXTS = sections(__package__, "interface.c.in")
+LONGEST_STRING = 4000
+"""Characters of a string that every C99 compiler takes, with some to spare: it must take 4095."""
 """Sections of the text around the equations, by name."""
 
 
@@ -323,8 +325,7 @@ class _Interface:
             ("input", exported.measured),
             ("option", exported.option_names),
         ):
-            listed = " ".join(f'"{name}\\0"' for name in names) or '""'
-            lines += [*wrapped(f"static const char {word}_names[] = {listed};"), ""]
+            lines += [*_names_table(f"{word}_names", names), ""]
         return "\n".join(lines)
 
     def switched(self) -> str:
@@ -374,6 +375,18 @@ class _Interface:
             member = f"m->{self.exported.members[part_index]}_limits.{c_name(name)}"
             lines.append(f"bits |= {member} ? (unsigned){bit_of[full]} : 0u;")
         return _body([*lines, "return bits;"])
+
+
+def _names_table(table: str, names: Sequence[str]) -> list[str]:
+    """Lines of an array of names, each with a zero behind it."""
+    listed = " ".join(f'"{name}\\0"' for name in names) or '""'
+    if sum(len(name) + 1 for name in names) <= LONGEST_STRING:
+        return wrapped(f"static const char {table}[] = {listed};")
+    lines = [f"static const char {table}[] = {{"]
+    for name in names:
+        characters = ", ".join(f"'{character}'" for character in name)
+        lines += wrapped(f"    {characters}, '\\0',")
+    return [*lines, "};"]
 
 
 def _body(lines: Sequence[str]) -> str:

@@ -798,4 +798,4 @@ def outside(model: Model, worst: float, cause: str) -> str:
             sentences.append(part.outside(worst, cause))
         else:
             sentences.append(f"{part.outside} under this {cause}.")
-    return " Or: ".join(sentences)
+    return " Or: ".join(dict.fromkeys(sentences))

@@ -1,0 +1,252 @@
+"""The crane as a machine: bits of a run in open loop, other drives, modes, and exports."""
+
+from math import cos, pi, sqrt
+from typing import NamedTuple
+
+import numpy as np
+import pytest
+from tests.export.conftest import InC, compiled  # noqa: F401  # a fixture
+from tests.marks import rest_slow
+
+from swashplate import FullOrderDrive, linearize, simulate
+from swashplate.crane import AXES, Crane, OperatorCommand, Seaway, Suspension, body, plant
+from swashplate.crane import simulate as simulate_crane
+from swashplate.errors import DomainError, InputError
+from swashplate.export import compare, content_of, fmu
+from swashplate.export.c_source import interface
+from swashplate.machine import Machine, Model, equation
+
+G = 9.80665
+SHIP = ("surge", "sway", "heave", "roll", "pitch", "yaw")
+SPEEDS = [f"{axis}_speed" for axis in AXES]
+SIGNALS = [f"{point}_{axis}" for point in ("tip", "load", "hook") for axis in "xyz"]
+SIGNALS += [f"shaft_{axis}" for axis in AXES] + ["pull", "rope", "boom_cos", "boom_sin"]
+ELASTIC = Suspension(stiffness=6e7)
+HOOK = Suspension(hook=2000.0, sling=6.0)
+BOTH = Suspension(stiffness=6e7, hook=2000.0, sling=6.0)
+THROWN = {
+    "drag_area": 12.0,
+    "wind": (10.0, -5.0),
+    "load_offset": (1.0, 0.5),
+    "load_velocity": (0.2, -0.1),
+}
+
+
+@pytest.fixture(scope="module")
+def crane():
+    return Crane.preset("tg3637")
+
+
+def command(length=10.0):
+    return OperatorCommand.trapezoid(
+        hoist=-0.2, slew=1.0, luff=0.3, duration=0.5 * length, length=length
+    )
+
+
+def inputs_of(run):
+    """What a run's drives and body took, by the machine's names."""
+    inputs = {f"{axis}.voltage": run[f"voltage_{axis}"] for axis in AXES}
+    moving = run.ship.shape[1] > 1
+    return inputs | {
+        f"body.{name}": run.ship[:, column] if moving else 0.0 for column, name in enumerate(SHIP)
+    }
+
+
+CASES = [
+    ({}, None),
+    ({"rope_m": 27.0}, "ss3"),
+    ({"brake": False}, None),
+    ({"suspension": ELASTIC}, "ss3"),
+    ({"suspension": HOOK}, "ss3"),
+    ({"suspension": BOTH, "swing_damping": 0.0}, "ss3"),
+    (THROWN, None),
+]
+
+
+@pytest.mark.parametrize(("how", "sea"), rest_slow(CASES, 2))
+def test_machine_has_the_bits_of_a_run_in_open_loop(crane, how, sea):
+    waters = None if sea is None else Seaway(sea, seed=1)
+    run = simulate_crane(crane, command(), sea=waters, **how)
+    found = simulate(plant(crane, **how), inputs_of(run), 512.0)
+    for name in SIGNALS:
+        np.testing.assert_array_equal(found[f"body.{name}"], run[name], name)
+    for axis in ("slew", "luff"):
+        np.testing.assert_array_equal(found[f"{axis}.shaft_speed"], run[f"speed_{axis}"])
+    np.testing.assert_allclose(found["swing"], np.radians(run.swing_deg), atol=1e-14)
+    np.testing.assert_array_equal(np.degrees(found["off_lead"]), run.off_lead_deg)
+    np.testing.assert_array_equal(np.degrees(found["side_lead"]), run.side_lead_deg)
+    np.testing.assert_array_equal(found["tension"], run.tension)
+    assert np.ptp(run["load_x"]) > 0.5
+
+
+# --- other drives ---------------------------------------------------------------------------------
+
+
+class Winch(NamedTuple):
+    gain: float
+    lag: float
+
+
+class Turning(NamedTuple):
+    shaft_speed: float = 0.0
+
+
+@equation
+def turn(state: Turning, voltage: float, p: Winch, h: float) -> Turning:
+    return Turning(state.shaft_speed + h / p.lag * (p.gain * voltage - state.shaft_speed))
+
+
+winch = Model("winch", Winch, Turning, turn)
+FULL = {"body.surge": 0.0, "body.sway": 0.0, "body.heave": 0.0}
+STILL = dict.fromkeys((f"body.{name}" for name in SHIP), 0.0)
+
+
+def test_a_winch_of_ones_own_lifts_the_load(crane):
+    machine = plant(crane, drives={"hoist": Machine(winch, Winch(0.5, 0.2))})
+    volts = {"hoist.voltage": np.full(1024, 4.0), "slew.voltage": 0.0, "luff.voltage": 0.0}
+    run = simulate(machine, volts | STILL, 512.0)
+    # 2 rad/s after a lag: the load rises by r/n times the angle
+    angle = run["shaft_hoist"][-1]
+    assert angle == pytest.approx(2.0 * (1023 / 512 - 0.2), rel=1e-2)
+    rise = run["load_z"][-1] - run["load_z"][0]
+    assert rise == pytest.approx(crane.geometry.hoist * angle, abs=5e-3)
+
+
+@pytest.mark.slow
+def test_drives_of_five_states_move_the_crane_nearly_as_identified_ones(crane):
+    five = {axis: FullOrderDrive.preset(axis) for axis in AXES}
+    run = simulate_crane(crane, command(20.0), brake=False)
+    inputs = inputs_of(run)
+    found = simulate(plant(crane, drives=five), inputs, 512.0)
+    turned = run["shaft_slew"][-1]
+    assert found["shaft_slew"][-1] == pytest.approx(turned, rel=0.05)
+    assert (found["shaft_slew"] != run["shaft_slew"]).any()
+
+
+def test_refusals_say_what_to_give(crane):
+    with pytest.raises(InputError, match="no drive 'boom'"):
+        plant(crane, drives={"boom": crane.luff})
+    with pytest.raises(InputError, match="luff of tg3637 is .*'shaft_speed'"):
+        plant(crane, drives={"luff": body(crane)})
+    with pytest.raises(InputError, match="rope of tg3637 is 200 m"):
+        plant(crane, rope_m=200.0)
+    with pytest.raises(InputError, match="load is 90000 kg"):
+        body(crane, load=9e4)
+    bouncing = body(crane, suspension=ELASTIC)
+    with pytest.raises(InputError, match="bounce on .* too fast for 20 samples"):
+        simulate(bouncing, dict.fromkeys(bouncing.ports.external, np.zeros(9)), 20.0)
+
+
+def test_ends_of_the_travel_are_limits_and_a_jump_leaves_the_domain(crane):
+    machine = body(crane, boom_deg=45.0)
+    still = dict.fromkeys(machine.ports.external, 0.0)
+    run = simulate(machine, still | {"luff_speed": np.full(1200, -60.0)}, 512.0)
+    lowest = crane.boom_limits[0]
+    np.testing.assert_array_equal(run.active("boom_end"), run["boom"] < lowest)
+    assert run.active("boom_end").any()
+    assert not run.active("boom_end").all()
+    jump = np.zeros(64)
+    jump[30:] = 40.0
+    with pytest.raises(DomainError, match="tip moves within one sample"):
+        simulate(machine, still | {"surge": jump}, 512.0)
+
+
+# --- small motion ---------------------------------------------------------------------------------
+
+
+def modes(model, member):
+    """Poles of a member that are neither gone after one step nor integrate. [rad/s]"""
+    poles = model.poles_of(*[name for name in model.states if name.startswith(member)])
+    left = poles[(np.abs(poles) > 1e-3) & (np.abs(poles - 1.0) > 1e-6)]
+    return np.log(left) * model.rate
+
+
+def test_load_swings_at_the_root_of_g_over_l_with_its_damping(crane):
+    machine = plant(crane, rope_m=25.0, swing_damping=0.01)
+    at = {f"{axis}.voltage": 0.0 for axis in AXES} | STILL
+    model = linearize(machine, at, 512.0)
+    swing = modes(model, "body")
+    assert swing.size == 4  # along the boom and across it
+    omega = sqrt(G / 25.0)
+    np.testing.assert_allclose(np.abs(swing), omega, rtol=1e-5)
+    np.testing.assert_allclose(-swing.real / np.abs(swing), 0.01, rtol=1e-3)
+    assert model.units["body.swing"] == "rad"
+    assert model.units["body.tip_x"] == model.units["body.surge"] == "m"
+
+
+def test_hook_and_load_swing_as_a_double_pendulum(crane):
+    machine = body(crane, rope_m=20.0, swing_damping=0.0, suspension=HOOK)
+    at = dict.fromkeys(machine.ports.external, 0.0)
+    model = linearize(machine, at, 512.0)
+    found = np.abs(modes(model, ""))
+    # of two masses on lines of 20 and 6 m, by their stiffness and mass matrices
+    load, hook, rope, sling = crane.safe_load, 2000.0, 20.0, 6.0
+    upper, lower = (load + hook) * G / rope, load * G / sling
+    stiffness = np.array([[upper + lower, -lower], [-lower, lower]])
+    squares = np.linalg.eigvals(np.linalg.solve(np.diag([hook, load]), stiffness))
+    np.testing.assert_allclose(np.unique(found.round(4)), np.sqrt(np.sort(squares)), rtol=1e-4)
+
+
+def test_linear_body_swings_as_the_whole_one_does_by_little(crane):
+    place = {"boom_deg": 50.0, "rope_m": 25.0, "swing_damping": 0.0}
+    machine = body(crane, **place)
+    at = dict.fromkeys(machine.ports.external, 0.0)
+    names = ("off_lead", "side_lead", "rope", "slew", "boom")
+    model = linearize(machine, at, 512.0, inputs=SPEEDS, outputs=names)
+    time = np.arange(20 * 512 + 1) / 512.0
+    wave = 0.01 * np.sin(2.0 * pi * time / 8.0) ** 2 * (time < 8.0)
+    speeds = np.stack([-2.0 * wave, 0.05 * wave, -wave], axis=1)
+    state, made = np.zeros(model.A.shape[0]), np.empty((time.size, len(names)))
+    for n, u in enumerate(speeds):
+        made[n] = model.C @ state + model.D @ u
+        state = model.A @ state + model.B @ u
+    inputs = dict(zip(SPEEDS, speeds.T, strict=True)) | dict.fromkeys(SHIP, 0.0)
+    run = simulate(machine, inputs, 512.0)
+    for column, name in enumerate(names):
+        change = run[name] - run[name][0]
+        largest = np.abs(change).max()
+        assert largest > 1e-7
+        np.testing.assert_allclose(change, made[:, column], atol=0.015 * largest, err_msg=name)
+
+
+def test_tip_moves_by_the_kinematics_of_the_boom(crane):
+    machine = body(crane, boom_deg=50.0, slew_deg=0.0)
+    at = dict.fromkeys(machine.ports.external, 0.0)
+    model = linearize(machine, at, 512.0, inputs=["slew_speed"], outputs=["tip_x", "tip_y"])
+    step = model.C @ model.B + model.D
+    # half of the step's speed now, all of it a sample later: the trapezoidal rule
+    radius = crane.geometry.foot + crane.geometry.boom * cos(50.0 * pi / 180.0)
+    np.testing.assert_allclose(model.D[:, 0], [0.0, -0.5 * radius / 512.0], atol=1e-12)
+    assert step[1, 0] == pytest.approx(-radius / 512.0, rel=0.6)
+
+
+# --- exports --------------------------------------------------------------------------------------
+
+
+def test_crane_in_c_has_the_bits_of_a_run(crane, compiled):  # noqa: F811
+    run = simulate_crane(crane, command(2.0), sea=Seaway("ss3", seed=1))
+    content = content_of(plant(crane), 1.0 / 512.0, prefix="crane")
+    in_c = InC(compiled(interface(content.exported)), "crane", content.values)
+    inputs = inputs_of(run)
+    names = [f"body.{name}" for name in SIGNALS]
+    places = [in_c.number("_output", name) for name in names]
+    assert -1 not in places
+    table = np.transpose([inputs[name] for name in inputs])
+    order = [list(inputs).index(name) for name in content.exported.signals]
+    for n, row in enumerate(table[:, order].tolist()):
+        assert in_c.step(*row) == 0
+        assert [in_c.output(place) for place in places] == [run[name][n] for name in SIGNALS]
+
+
+@pytest.mark.slow
+def test_fmu_of_the_crane_has_its_bits_in_fmpy(crane, tmp_path):
+    pytest.importorskip("fmpy")
+    machine = plant(crane, brake=False)
+    path = fmu(machine, tmp_path / "crane.fmu")
+    calm = compare(path, machine, inputs_of(simulate_crane(crane, command(2.0), brake=False)))
+    assert calm.equal
+    assert {"body.load_x", "body.swing", "luff.shaft_speed"} <= set(calm.differences)
+    # outputs follow the ship at once, and FMPy extrapolates inputs from the step before: rounding
+    run = simulate_crane(crane, command(2.0), sea=Seaway("ss3", seed=1), brake=False)
+    at_sea = compare(path, machine, inputs_of(run))
+    assert 0.0 < max(at_sea.differences[f"body.{name}"] for name in ("load_x", "tip_x")) < 1e-6
