@@ -140,13 +140,19 @@ def tip_at(shafts: Shafts, inputs: BodyInputs, p: Body) -> Vector:
     return to_inertial(r, tip_of(p.home.slew + shafts.slew, boom, p.geometry), shift)
 
 
+class UpperEnd(NamedTuple):
+    """The rope's upper end, and how long it is below."""
+
+    tip: Vector
+    rope: float
+    """[m]"""
+
+
 @equation
 def led_load(
     before: Hung,
-    last_tip: Vector,
-    tip: Vector,
-    rope: float,
-    last_rope: float,
+    last: UpperEnd,
+    now: UpperEnd,
     samples: float,
     start: Start,
     s: Hanging,
@@ -159,15 +165,16 @@ def led_load(
     """
     hung = before
     if samples < 0.5:
-        hung = hanging_load(tip, start.offset_x, start.offset_y, rope, s)
+        hung = hanging_load(now.tip, start.offset_x, start.offset_y, now.rope, s)
     else:
         square = h * h
         if samples < 1.5:
             square = 0.5 * square
-            tip_step = add_scaled(tip, -1.0, last_tip)
+            tip_step = add_scaled(now.tip, -1.0, last.tip)
+            lowered = now.rope - last.rope
             v_x, v_y = start.velocity_x, start.velocity_y
-            hung = set_off(hung, last_tip, tip_step, rope - last_rope, v_x, v_y, h)
-        hung = rope_step(hung, last_tip, tip, rope, s, h, square)
+            hung = set_off(hung, last.tip, tip_step, lowered, v_x, v_y, h)
+        hung = rope_step(hung, last.tip, now.tip, now.rope, s, h, square)
     return hung
 
 
@@ -207,10 +214,8 @@ def body_sample(state: BodyState, inputs: BodyInputs, p: Body, h: float) -> Body
     )
     hung = led_load(
         before,
-        state.last_tip,
-        tip,
-        rope,
-        state.last_rope,
+        UpperEnd(state.last_tip, state.last_rope),
+        UpperEnd(tip, rope),
         state.samples,
         p.start,
         p.hanging,

@@ -41,7 +41,7 @@ from swashplate.crane.kinematics import (
     to_inertial,
     to_ship,
 )
-from swashplate.crane.motion import BrakeState, braked, led_load, rope_torques
+from swashplate.crane.motion import BrakeState, UpperEnd, braked, led_load, rope_torques
 from swashplate.crane.rope import (
     GRAVITY,
     Hanging,
@@ -560,10 +560,8 @@ def advance_crane(
             break
         hung = led_load(
             hung,
-            tip,
-            following,
-            rope,
-            previous_rope,
+            UpperEnd(tip, previous_rope),
+            UpperEnd(following, rope),
             float(sample),
             fixed.start,
             fixed.hanging,
