@@ -126,7 +126,17 @@ def year(crane):
     cells = {"no control": none, "identified": own}
     hoist = (0.7, 8.0, 90.0)
     controller, headings = control.Clip(), (0.0, 90.0)
-    return Operability(crane, controller, scatter, headings, cells, Seaway(), "The case.", hoist)
+    return Operability(
+        crane=crane,
+        control=controller,
+        scatter=scatter,
+        headings=headings,
+        cells=cells,
+        seaway=Seaway(),
+        case="The case.",
+        crewed=False,
+        hoist_limit=hoist,
+    )
 
 
 def written(write, result, folder):
