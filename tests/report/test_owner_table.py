@@ -51,8 +51,8 @@ def measured(drive: Drive) -> list[Experiment]:
     return runs
 
 
-NEXT_TO_NONE = 1e-9
-"""Current. [A]"""
+FAST = 100.0
+"""Rate of a current that rises at once, in A/s."""
 
 
 def fitted(
@@ -64,7 +64,7 @@ def fitted(
 ) -> Fit:
     """The fit of every number of a guess; no orifice, or bounds of the dead zone in V, one way.
 
-    Not `behind`: that no part of the dead zone lies behind a ramp is known.
+    Not `behind`: the current is known to rise at once, so that no dead zone lies behind a ramp.
     """
     guess = guess_drive(runs)
     if dead_zone_minus is not None:
@@ -72,7 +72,7 @@ def fitted(
         guess = guess._replace(dead_zone=(guess.dead_zone[0], sum(dead_zone_minus) / 2.0))
     start = guessed_set(guess, "campaign.toml")
     if not behind:
-        start = start.replace({"Z17": NEXT_TO_NONE})
+        start = start.replace({"lim1": FAST, "lim2": FAST, "I_t1": 0.0, "I_t2": 0.0})
     setup = whole_drive(start)
     free = dict(setup.free)
     if not orifice_minus:
