@@ -1,26 +1,21 @@
-"""The crane as a machine: bits of a run in open loop, other drives, modes, and exports."""
+"""The crane as a machine: bits of a run in open loop, other drives, modes."""
 
 from math import cos, pi, sqrt
 from typing import NamedTuple
 
 import numpy as np
 import pytest
-from tests.export.conftest import InC, compiled  # noqa: F401  # a fixture
+from tests.crane.open_loop import SHIP, SIGNALS, command, inputs_of
 from tests.marks import rest_slow
 
 from swashplate import FullOrderDrive, linearize, simulate
-from swashplate.crane import AXES, Crane, OperatorCommand, Seaway, Suspension, body, plant
+from swashplate.crane import AXES, Crane, Seaway, Suspension, body, plant
 from swashplate.crane import simulate as simulate_crane
 from swashplate.errors import DomainError, InputError
-from swashplate.export import compare, content_of, fmu
-from swashplate.export.c_source import interface
 from swashplate.machine import Machine, Model, equation
 
 G = 9.80665
-SHIP = ("surge", "sway", "heave", "roll", "pitch", "yaw")
 SPEEDS = [f"{axis}_speed" for axis in AXES]
-SIGNALS = [f"{point}_{axis}" for point in ("tip", "load", "hook") for axis in "xyz"]
-SIGNALS += [f"shaft_{axis}" for axis in AXES] + ["pull", "rope", "boom_cos", "boom_sin"]
 ELASTIC = Suspension(stiffness=6e7)
 HOOK = Suspension(hook=2000.0, sling=6.0)
 BOTH = Suspension(stiffness=6e7, hook=2000.0, sling=6.0)
@@ -35,21 +30,6 @@ THROWN = {
 @pytest.fixture(scope="module")
 def crane():
     return Crane.preset("tg3637")
-
-
-def command(length=10.0):
-    return OperatorCommand.trapezoid(
-        hoist=-0.2, slew=1.0, luff=0.3, duration=0.5 * length, length=length
-    )
-
-
-def inputs_of(run):
-    """What a run's drives and body took, by the machine's names."""
-    inputs = {f"{axis}.voltage": run[f"voltage_{axis}"] for axis in AXES}
-    moving = run.ship.shape[1] > 1
-    return inputs | {
-        f"body.{name}": run.ship[:, column] if moving else 0.0 for column, name in enumerate(SHIP)
-    }
 
 
 CASES = [
@@ -221,32 +201,3 @@ def test_tip_moves_by_the_kinematics_of_the_boom(crane):
 
 
 # --- exports --------------------------------------------------------------------------------------
-
-
-def test_crane_in_c_has_the_bits_of_a_run(crane, compiled):  # noqa: F811
-    run = simulate_crane(crane, command(2.0), sea=Seaway("ss3", seed=1))
-    content = content_of(plant(crane), 1.0 / 512.0, prefix="crane")
-    in_c = InC(compiled(interface(content.exported)), "crane", content.values)
-    inputs = inputs_of(run)
-    names = [f"body.{name}" for name in SIGNALS]
-    places = [in_c.number("_output", name) for name in names]
-    assert -1 not in places
-    table = np.transpose([inputs[name] for name in inputs])
-    order = [list(inputs).index(name) for name in content.exported.signals]
-    for n, row in enumerate(table[:, order].tolist()):
-        assert in_c.step(*row) == 0
-        assert [in_c.output(place) for place in places] == [run[name][n] for name in SIGNALS]
-
-
-@pytest.mark.slow
-def test_fmu_of_the_crane_has_its_bits_in_fmpy(crane, tmp_path):
-    pytest.importorskip("fmpy")
-    machine = plant(crane, brake=False)
-    path = fmu(machine, tmp_path / "crane.fmu")
-    calm = compare(path, machine, inputs_of(simulate_crane(crane, command(2.0), brake=False)))
-    assert calm.equal
-    assert {"body.load_x", "body.swing", "luff.shaft_speed"} <= set(calm.differences)
-    # outputs follow the ship at once, and FMPy extrapolates inputs from the step before: rounding
-    run = simulate_crane(crane, command(2.0), sea=Seaway("ss3", seed=1), brake=False)
-    at_sea = compare(path, machine, inputs_of(run))
-    assert 0.0 < max(at_sea.differences[f"body.{name}"] for name in ("load_x", "tip_x")) < 1e-6

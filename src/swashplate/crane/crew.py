@@ -157,5 +157,5 @@ def catch_swing(
         memory.wanted[i, sample & last] = min(max(speed, -most), most)
         late = memory.wanted[i, (sample - operator.delay) & last]
         state[HAND, i] += h / operator.lag * (late - state[HAND, i])
-        asked = reference[i + 1] + state[HAND, i] / view.arms[i]
-        reference[i + 1] = min(max(asked, drives[i].low), drives[i].high)
+        shaft_speed = reference[i + 1] + state[HAND, i] / view.arms[i]
+        reference[i + 1] = min(max(shaft_speed, drives[i].low), drives[i].high)

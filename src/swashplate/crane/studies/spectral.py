@@ -286,8 +286,8 @@ def crew_response(omega: Array, operator: HumanOperator) -> Complex:
     """Offset of the tip over the swing that a crew without threshold sees, on ideal drives."""
     s = 1j * omega
     hand = np.exp(-s * operator.delay / RATE) / (1.0 + operator.lag * s)
-    kept = operator.return_time * s / (1.0 + operator.return_time * s)
-    return np.asarray(operator.gain * kept * hand / (s + hand / operator.return_time))
+    beyond_rest = operator.return_time * s / (1.0 + operator.return_time * s)
+    return np.asarray(operator.gain * beyond_rest * hand / (s + hand / operator.return_time))
 
 
 def _bounce(omega: Array, rope: float, mass: float, suspension: Suspension) -> Complex:
