@@ -7,6 +7,8 @@ are structural, and vanish.
 Besides arithmetic there are
 
 - "if": one of two values, by a test; `and` and `or` are choices with a literal side;
+- "past": what a value was, of the value now and its age in samples, which changes;
+- "element": one of several values, by its number from 0, which is the first operand;
 - "ruled": a value whose derivatives are declared, by the `DerivativeRule` in the node's `value`;
 - "call" of an equation apart, and "result", one of the numbers that it returns.
 """
@@ -24,7 +26,10 @@ MATH_FUNCTIONS = (
     *("atan2", "hypot", "floor"),
 )
 """Operations that are functions of `math`."""
+CHOSEN = ("if", "element")
+"""Operations whose value is one of their operands after the first."""
 CHEAP = {*LEAVES, *COMPARISONS, "not", "+", "-", "*", "neg", "min", "max", "abs", "if", "ruled"}
+CHEAP |= {"element"}
 """Operations that cost next to nothing on any numbers: no error, no call of a library."""
 
 
@@ -102,7 +107,7 @@ def _kind(op: str, operands: tuple[Node, ...]) -> str:
         return operands[0].kind
     if op in ("call", "result"):
         return "float"
-    kinds = {operand.kind for operand in (operands[1:] if op == "if" else operands)}
+    kinds = {operand.kind for operand in (operands[1:] if op in CHOSEN else operands)}
     if op == "floor" or (kinds == {"int"} and op not in ("/", *MATH_FUNCTIONS)):
         return "int"
     return "bool" if op == "if" and kinds == {"bool"} else "float"

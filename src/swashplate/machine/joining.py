@@ -14,6 +14,7 @@ from swashplate.machine.model import (
     Link,
     Model,
     SignalSource,
+    Tap,
     arguments_of,
     full_name,
     near_names,
@@ -21,7 +22,33 @@ from swashplate.machine.model import (
     source_of,
 )
 
-Wire = str | Equation | tuple[Any, ...]
+class Late(NamedTuple):
+    """A signal a sample later; see `late`."""
+
+    signal: str
+    before: str = ""
+
+
+def late(signal: str, before: str = "") -> Late:
+    """A signal as it was a sample before, for a link that closes a loop.
+
+    Parameters
+    ----------
+    signal : str
+        Its path; the part that gives it may stand behind the one that takes it.
+    before : str
+        What it was before the first sample: path of a parameter of the part that takes it; by
+        default it was zero.
+
+    Returns
+    -------
+    Late
+        What `join` takes as a link: ``links={"winch.load_torque": late("load.torque")}``.
+    """
+    return Late(signal, before)
+
+
+Wire = str | Late | Equation | tuple[Any, ...]
 """What an input takes: a signal, an equation over signals that its arguments name, or a tuple of an
 equation and the paths of its signals."""
 
@@ -84,6 +111,7 @@ def join(
     Notes
     -----
     A signal must be known before it is needed: loops without delay between models are not possible.
+    A `late` link takes it as it was a sample before.
 
     Examples
     --------
@@ -137,11 +165,13 @@ def _joined(
     for wanted, wire in links.items():
         inputs = [part.tap(each).signal for part in parts for each in part.input_types]
         at = full_name(wanted, inputs)
-        if isinstance(wire, str):
+        if isinstance(wire, str | Late):
             if at not in inputs:
                 raise InputError(f"Model {name}: there is no input {near_names(wanted, inputs)}.")
-            source = _signal(name, parts, linked, wire, [each for each in inputs if each != at])
-            parts = [_wired(part, at, source) for part in parts]
+            others = [] if isinstance(wire, Late) else [each for each in inputs if each != at]
+            signal = wire.signal if isinstance(wire, Late) else wire
+            source = _signal(name, parts, linked, signal, others)
+            parts = [_wired(part, at, source, wire) for part in parts]
         else:
             linked[at] = _link(name, at, parts, wire)
 
@@ -240,12 +270,18 @@ def _nested(title: str, kinds: Mapping[str, Any]) -> Any:
 # --- links ----------------------------------------------------------------------------------------
 
 
-def _wired(part: Model, at: str, signal: str) -> Model:
+def _wired(part: Model, at: str, signal: str, wire: str | Late) -> Model:
     """A part whose inputs of the name `at` take a signal."""
     inputs = [name for name in part.input_types if part.tap(name).signal == at]
     if not inputs:
         return part
-    return replace(part, parts=(), wired={**part.wired, **dict.fromkeys(inputs, signal)})
+    taps = dict(part.taps)
+    if isinstance(wire, Late):
+        for name in inputs:
+            tap = part.taps.get(name, Tap(name, hold="none"))
+            taps[name] = tap._replace(late=tap.late + 1, before=wire.before)
+    wired = {**part.wired, **dict.fromkeys(inputs, signal)}
+    return replace(part, parts=(), taps=taps, wired=wired)
 
 
 def _signal(
@@ -283,7 +319,8 @@ def _too_late(model: Model) -> Iterator[str]:
     inputs = [(index, name) for index, part in enumerate(model.parts) for name in part.input_types]
     for index, name in inputs:
         link = model.link_of(index, name)
-        for source in link.sources if link else ():
+        is_late = model.parts[index].tap(name).late
+        for source in link.sources if link and not is_late else ():
             upstream[index] |= {source.part, *upstream[source.part]}
     for index, name in inputs:
         signal = model.parts[index].tap(name).signal
@@ -302,7 +339,7 @@ def _too_late(model: Model) -> Iterator[str]:
         giver = model.parts[after].path
         instead = f"put {giver} before {part}"
         if index in {after, *upstream[after]}:
-            instead = "a loop must be one model, or be closed sample by sample with steppers"
+            instead = f"a loop takes a signal a sample late, late('{signal}'), or is one model"
         yield (
             f"Model {model.name}: {part} needs '{signal}', which is known only after {giver}: "
             f"{instead}."

@@ -48,7 +48,7 @@ from swashplate.machine.fields import (
 from swashplate.machine.language import is_named_tuple, type_of
 
 Equation = Callable[..., Any]
-Hold = Literal["linear", "previous", "mean"]
+Hold = Literal["linear", "previous", "mean", "none"]
 
 ARGUMENTS = ("state", "signals", "inputs", "p", "h", "options", "given")
 """Names that mean what the table above says; any other argument is an input."""
@@ -64,6 +64,21 @@ class Window(NamedTuple):
     """Samples, newest first."""
     f: float
     """Age of the instant that is read, relative to the newest sample, in samples, 0 to 1."""
+
+
+class History(NamedTuple):
+    """An input with its past, as far back as its `Tap` says; `past` reads it."""
+
+    newest: float
+    """The sample now."""
+    longest: float
+    """How far back it can be read. [samples]"""
+
+
+@equation
+def newest(window: Window) -> float:
+    """The newest sample."""
+    return window.s[0]
 
 
 @equation
@@ -111,12 +126,26 @@ class Tap(NamedTuple):
     """Samples of a `Window`; 0 passes the value itself, as `hold` makes it."""
     hold: Hold = "linear"
     """What the signal is between samples: a straight line, its last value, or, as the mean over the
-    last interval, what a logger or a controller averaged."""
+    last interval, what a logger or a controller averaged. ``"none"`` reads the newest sample."""
+    longest: str = ""
+    """Path of the parameter [s] up to which `past` reads back; the input is a `History` then."""
+    late: int = 0
+    """Samples by which a signal of another part comes later, see `swashplate.machine.late`."""
+    before: str = ""
+    """Path of the parameter that is a late signal before the record; by default it is zero."""
 
     @property
     def samples(self) -> int:
         """Samples that are read."""
-        return self.width or (3 if self.hold == "mean" else 2)
+        one = self.longest or self.hold == "none"
+        return self.width or (1 if one else 3 if self.hold == "mean" else 2)
+
+
+def type_of_input(tap: Tap) -> type[Any]:
+    """What an equation is given of a signal that is looked at in this way."""
+    if tap.longest:
+        return History
+    return Window if tap.width else float
 
 
 class TapDelay(NamedTuple):
@@ -255,10 +284,8 @@ class Model:
         if self.inputs is not None:
             return dict(get_type_hints(self.inputs))
         names = [name for equation in self.equations for name in arguments_of(equation)]
-        windows = {name for name, tap in self.taps.items() if tap.width}
-        return {
-            name: Window if name in windows else float for name in names if name not in ARGUMENTS
-        }
+        kinds = {name: type_of_input(tap) for name, tap in self.taps.items()}
+        return {name: kinds.get(name, float) for name in names if name not in ARGUMENTS}
 
     @cached_property
     def signals(self) -> type[Any] | None:
@@ -343,6 +370,10 @@ class Model:
             for name in part.input_types:
                 signal = part.tap(name).signal
                 link = self.links.get(signal)
+                if part.tap(name).late:
+                    late = source_of(self.parts, signal)
+                    found[index, name] = link or (Link(signal, (late,)) if late else None)
+                    continue
                 if link is None or link.after >= index:
                     source = before.get(signal)
                     link = Link(signal, (source,)) if source else None
@@ -553,11 +584,12 @@ def _wrong(model: Model) -> Iterator[str]:
         if tap.hold not in get_args(Hold):
             choice = ", ".join(get_args(Hold))
             yield f"{prefix}'{name}' has the hold '{tap.hold}'; there are {choice}."
-        if tap.delay and tap.delay not in parameters:
-            choice = ", ".join(parameters)
-            yield (
-                f"{prefix}the delay of '{name}' is '{tap.delay}', but the parameters are {choice}."
-            )
+        for word in ("delay", "longest", "before"):
+            path = getattr(tap, word)
+            if path and path not in parameters:
+                what = {"delay": "delay", "longest": "longest delay"}.get(word, "value before")
+                choice = ", ".join(parameters)
+                yield f"{prefix}the {what} of '{name}' is '{path}', but the parameters are {choice}."
     states = floats_of(model.state)
     for name in [path for paths in model.free_start.values() for path in paths]:
         if name not in states:
@@ -693,7 +725,7 @@ def tap_delay(tap: Tap, delay: float, h: float) -> TapDelay:
     back = max(steps, tap.ahead) - tap.ahead
     samples = int(back // 1.0)
     slope = 1.0 / h if steps >= tap.ahead else 0.0
-    return TapDelay(samples, back - samples, slope)
+    return TapDelay(samples + tap.late, back - samples, slope)
 
 
 def arguments_of(equation: Equation) -> tuple[str, ...]:

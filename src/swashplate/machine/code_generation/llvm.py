@@ -49,6 +49,11 @@ class Code:
         self._count = 0
         self._results: dict[Node, list[str]] = {}
         """Of each call."""
+        self._arrays: dict[tuple[str, ...], str] = {}
+        self.places: dict[Node, tuple[str, int]] = {}
+        """Array and place of numbers that stand in one and do not change."""
+        self.lines: dict[Node, Callable[[str, int], str]] = {}
+        """Of samples what reads those before them: of the whole number of samples, and the lane."""
 
     @property
     def text(self) -> str:
@@ -323,6 +328,10 @@ class Code:
                 return self.put(f"xor {self.bit} {test}, {self.constant(True)}")
             case "if":
                 return self._choice(node, operands, texts)
+            case "element":
+                return self._element(operands, texts)
+            case "past":
+                return self._past(operands[0], *texts)
         floats = [
             self._as_float(operand, text) for operand, text in zip(operands, texts, strict=True)
         ]
@@ -343,6 +352,55 @@ class Code:
             for operand, text in zip(operands[1:], texts[1:], strict=True)
         ]
         return self.select(test, *sides)
+
+    def _element(self, operands: Sequence[Node], texts: Sequence[str]) -> str:
+        """One of several numbers: from where they stand one after the other, or are put so."""
+        place, *elements = map(self._as_float, operands, texts)
+        places = [self.places.get(node) for node in operands[1:]]
+        first = places[0]
+        lanes = self.wide or 1
+        if first and places == [(first[0], first[1] + k * lanes) for k in range(len(places))]:
+            array, begin = first
+        else:
+            array, begin = self._array(elements), 0
+        found = []
+        for lane in range(lanes):
+            number = self.put(f"fptosi double {self.element(place, lane)} to i64")
+            number = self.put(f"mul i64 {number}, {lanes}")
+            number = self.put(f"add i64 {number}, {begin + lane}")
+            found.append(self.load(array, number, "double"))
+        return self.joined(found)
+
+    def _past(self, newest: Node, now: str, age: str) -> str:
+        """What a value was at an age in samples, straight between them."""
+        if newest not in self.lines:  # where a record begins nothing has changed yet
+            return now
+        read = self.lines[newest]
+        newer, older = list[str](), list[str]()
+        for lane in range(self.wide or 1):
+            whole = self.put(f"fptosi double {self.element(age, lane)} to i64")
+            newer.append(read(whole, lane))
+            older.append(read(self.put(f"add i64 {whole}, 1"), lane))
+        kind = self.number
+        first, second = self.joined(newer), self.joined(older)
+        fraction = self.put(f"fsub {kind} {age}, {self.function('floor', age)}")
+        change = self.put(f"fsub {kind} {second}, {first}")
+        change = self.put(f"fmul {kind} {fraction}, {change}")
+        return self.put(f"fadd {kind} {first}, {change}")
+
+    def _array(self, elements: Sequence[str]) -> str:
+        """Address of numbers one after the other, of each all lanes."""
+        key = tuple(elements)
+        if key not in self._arrays:
+            self._count += 1
+            name = f"%v{self._count}"
+            self._slots.append(
+                f"  {name} = alloca [{len(elements)} x {self.number}], align 64"
+            )
+            self._arrays[key] = name
+        for place, text in enumerate(elements):
+            self.store(text, self._arrays[key], place * (self.wide or 1))
+        return self._arrays[key]
 
     def _operation(self, node: Node, floats: Sequence[str]) -> str:
         """An operation on numbers."""

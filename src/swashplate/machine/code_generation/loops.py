@@ -30,6 +30,8 @@ S = TypeVar("S")
 
 STEPS = 128
 """Most steps of the search for a root; some 10 are usual."""
+FEW_KNOTS = 16
+"""Longest table of which every segment is looked at; of longer ones one is found by bisection."""
 PRECISION = 4.4e-16
 TINY = 1e-300
 
@@ -118,6 +120,27 @@ def interpolate(x: float, knots: tuple[float, ...], values: tuple[float, ...]) -
             at = i
     share = (x - knots[at]) / (knots[at + 1] - knots[at])
     return values[at] + min(max(0.0, share), 1.0) * (values[at + 1] - values[at])
+
+
+@inlined
+def past(history: Any, age: float) -> float:
+    """What an input was some time ago, straight between its samples.
+
+    Parameters
+    ----------
+    history : History
+        An input whose `Tap` says how far back it is read.
+    age : float
+        How long ago, in samples; it may change from sample to sample. Ages below 0 or beyond the
+        longest count as these. [samples]
+
+    Returns
+    -------
+    float
+        The value; before the record, what the input was before.
+    """
+    newest: float = history.newest
+    return newest  # as where a record begins: nothing has changed yet
 
 
 @inlined

@@ -238,6 +238,12 @@ class C:
         op, level = node.op, LEVELS.get(node.op, ATOM)
         if op == "if":
             return self._choice(node, operands)
+        if op == "element":
+            (place, _), *elements = (
+                as_double(*pair) for pair in zip(node.args, operands, strict=True)
+            )
+            listed = ", ".join(text for text, _ in elements)
+            return f"((const double[]){{{listed}}})[(int)({place})]", ATOM
         if op == "not":
             return f"!{grouped(operands[0], level)}", level
         if op == "neg":

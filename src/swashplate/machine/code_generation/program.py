@@ -24,6 +24,19 @@ from swashplate.machine.graph import MATH_FUNCTIONS, Node, name, ordered, plain_
 Array = NDArray[np.float64]
 
 
+class Line(float):
+    """A sample that knows those before it."""
+
+    at: Callable[[int], float]
+    """What the value was so many samples ago."""
+
+    def ago(self, age: float) -> float:
+        """The value at an age in samples, straight between them."""
+        whole = int(age)
+        newer, older = self.at(whole), self.at(whole + 1)
+        return newer + (age - whole) * (older - newer)
+
+
 class Step(NamedTuple):
     """A number that is computed."""
 
@@ -123,6 +136,11 @@ def _done(step: Step, operands: list[Any]) -> Any:
             return operands[0]
         case "if":
             return operands[1] if operands[0] else operands[2]
+        case "element":
+            return operands[1 + int(operands[0])]
+        case "past":
+            newest, age = operands
+            return newest.ago(age) if isinstance(newest, Line) else newest
         case "result":
             return operands[0][step.value]
         case "**":
@@ -144,6 +162,9 @@ def _done_over(step: Step, operands: list[Any]) -> Any:
     match step.op:
         case "number":
             return step.value
+        case "element":
+            place, *elements = np.broadcast_arrays(*operands)
+            return np.take_along_axis(np.array(elements), place[None].astype(int), 0)[0]
         case "**" if step.value < 0:
             return np.divide(1.0, power(operands[0], -step.value))
         case "**":

@@ -15,6 +15,7 @@ from functools import partial
 from types import MappingProxyType
 from typing import NamedTuple
 
+from swashplate.errors import InputError
 from swashplate.machine import graph
 from swashplate.machine.graph import (
     FALSE,
@@ -108,7 +109,7 @@ class Slopes:
         if node.op == "ruled":
             rule: DerivativeRule = node.value
             return rule.arguments
-        return node.args[1:] if node.op == "if" else node.args
+        return node.args[1:] if node.op in graph.CHOSEN else node.args
 
     def of(self, node: Node) -> Iterator[tuple[Node, Contribution]]:
         """Operands that move a node, each with the derivative by it."""
@@ -126,6 +127,18 @@ class Slopes:
             for operand, side in ((first, test), (second, opposite(test))):
                 if operand in self.active:
                     yield operand, _restricted(contribution, side)
+            return
+        if node.op == "past":
+            raise InputError(
+                "An equation reads the past at an age that changes, so that there are no "
+                "derivatives: the model can be simulated and stepped, but not fitted or linearised."
+            )
+        if node.op == "element":
+            place, *elements = node.args
+            for number, operand in enumerate(elements):
+                if operand in self.active:
+                    test = make("==", place, graph.number(float(number)))
+                    yield operand, _restricted(contribution, test)
             return
         for operand, slope in self._slopes(node):
             if operand in self.active:
@@ -206,7 +219,7 @@ class Slopes:
         return self._slopes_of_calls[call]
 
 
-TAME = {"number", "name", "+", "-", "*", "neg", "abs", "min", "max", "if", "not"}
+TAME = {"number", "name", "+", "-", "*", "neg", "abs", "min", "max", "if", "element", "not"}
 TAME |= {*graph.COMPARISONS}
 """Operations that make finite numbers of moderate ones."""
 

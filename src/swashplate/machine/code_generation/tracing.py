@@ -21,8 +21,10 @@ from swashplate.errors import EquationError
 from swashplate.machine import graph
 from swashplate.machine.code_generation.decisions import deep, on_symbols
 from swashplate.machine.code_generation.loops import (
+    FEW_KNOTS,
     called_apart,
     interpolate,
+    past,
     repeated,
     repetition,
     root,
@@ -429,6 +431,8 @@ class Trace:
             return function(*arguments, **named)
         if function is root or function is repeated:
             return self._loop(function.__name__, arguments, named)
+        if function is past:
+            return self._past(**self._given(past, text, arguments, named))
         if function is interpolate:
             return self._interpolation(**self._given(interpolate, text, arguments, named))
         if not is_function(function):
@@ -481,6 +485,16 @@ class Trace:
         values = [_nodes(value) for value in others]
         return self._symbols(make_of(self, inner, values[0], values[1], values[2:]))
 
+    def _past(self, history: Any, age: Any) -> Any:
+        """Value of a call of `past`: ages are those that the history has."""
+        fields_of = getattr(history, "_fields", ())
+        if fields_of != ("newest", "longest") or isinstance(age, tuple):
+            what = "past of something else than an input with its past and a number"
+            raise RefusedError(what, "type the input History, and say in its Tap how far it goes")
+        newest, longest = map(operand, history)
+        inside = self.make("min", self.make("max", operand(age), ZERO), longest)
+        return Symbol(self.make("past", newest, inside), self)
+
     def _interpolation(self, x: Any, knots: Any, values: Any) -> Any:
         """Value of a call of `interpolate`."""
         table = isinstance(knots, tuple) and isinstance(values, tuple)
@@ -504,6 +518,8 @@ class Trace:
 
     def _interpolated(self, x: Node, knots: Sequence[Node], values: Sequence[Node]) -> Node:
         """Nodes of `interpolate`: the segment of x is chosen, then a straight line evaluated."""
+        if len(knots) > FEW_KNOTS:
+            return self._looked_up(x, knots, values)
         make, label = self.make, self.label
         ends = [knots[0], knots[1], values[0], values[1]]
         for segment in range(1, len(knots) - 1):
@@ -514,7 +530,31 @@ class Trace:
             ]
             for node, name in zip(ends, ("left", "right", "low", "high"), strict=True):
                 label(self.noted(node), name)
-        left, right, low, high = ends
+        return self._between(x, *ends)
+
+    def _looked_up(self, x: Node, knots: Sequence[Node], values: Sequence[Node]) -> Node:
+        """The same for a long table: the segment is found by bisection."""
+        make = self.make
+        place: Node = ZERO
+        last = len(knots) - 2
+        step = 1 << (last.bit_length() - 1)
+        while step:
+            further = make("+", place, graph.number(float(step)))
+            at = make("min", further, graph.number(float(last)))
+            inside = graph.both(
+                make("<=", further, graph.number(float(last))),
+                make(">=", x, make("element", at, *knots)),
+            )
+            place = choose(inside, further, place)
+            step //= 2
+        self.label(self.noted(place), "segment")
+        following = make("+", place, ONE)
+        ends = [make("element", at, *table) for table in (knots, values) for at in (place, following)]
+        return self._between(x, *ends)
+
+    def _between(self, x: Node, left: Node, right: Node, low: Node, high: Node) -> Node:
+        """On the straight line between both ends of a segment; beyond them the ends' values."""
+        make, label = self.make, self.label
         share = make("/", make("-", x, left), make("-", right, left))
         label(share, "share")
         inside = make("min", make("max", ZERO, share), ONE)

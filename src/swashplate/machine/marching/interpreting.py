@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from swashplate.machine.code_generation.program import names_of, program_of
+from swashplate.machine.code_generation.program import Line, names_of, program_of
 from swashplate.machine.code_generation.values import leaves
 from swashplate.machine.graph import Node
 from swashplate.machine.marching.kernels import MarchArrays
@@ -77,7 +77,8 @@ class _SampleProgram:
                     signal = self._signals.index(self.model.parts[part].tap(name).signal)
                 back = int(arrays.delay_samples[tap.number]) + int(age) if tap and age else 0
                 record, before = arrays.records[signal], arrays.before[signal]
-                found.append((place, _reader(record, float(before), back)))
+                read = _reader(record, float(before), back)
+                found.append((place, _with_past(read) if tap and tap.tap.longest else read))
         return found
 
     def values(
@@ -109,6 +110,17 @@ class _SampleProgram:
             for place, stored in enumerate(self._ids)
             if stored.kind == "state"
         ]
+
+
+def _with_past(read: Callable[[int], float]) -> Callable[[int], float]:
+    """What gives a record's value that knows those before it."""
+
+    def sample(n: int) -> Line:
+        line = Line(read(n))
+        line.at = lambda age: read(n - age)
+        return line
+
+    return sample
 
 
 def _reader(record: Any, before: float, back: int) -> Callable[[int], float]:

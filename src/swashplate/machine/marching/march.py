@@ -46,6 +46,7 @@ def numbers_known(
                 if node.value in names:
                     place = places.index((part.part, path)) * (code.wide or 1)
                     known[node] = code.load(array, place)
+                    code.places[node] = array, place
     return known
 
 
@@ -137,6 +138,9 @@ class March:
             code.values(sample_code.ends[part.part], known)
             if part.margin is not None:
                 self._take_in(known[graph.plain_value(part.margin)])
+        for tap in sample_code.late:
+            if tap.tap.late:
+                self._keep(tap, n, known)
         return known
 
     def _inputs(self, part: PartCode, n: str, sources: Mapping[Node, str]) -> dict[Node, str]:
@@ -144,15 +148,15 @@ class March:
         code, sample_code = self.code, self.sample_code
         known, read = dict[Node, str](), sample_code.read(part) | self._names
         for tap in part.between:
-            if tap in sample_code.late:
-                (text,) = code.floats([part.tapped(tap)], dict(sources))
-                place = code.put(f"mul i64 {n}, {self._lanes}")
-                code.store(text, self._between[tap.between], place)
+            if tap in sample_code.late and not tap.tap.late:
+                self._keep(tap, n, sources)
         for tap in part.taps:
             for age, name in enumerate(part.tap_samples(tap)):
                 if name in read:
-                    places = [self._past(tap, lane, age, n) for lane in range(self._lanes)]
+                    places = [self._past(tap, lane, str(age), n) for lane in range(self._lanes)]
                     known[graph.name(name)] = code.joined(places)
+                    if tap.tap.longest:
+                        code.lines[graph.name(name)] = self._line(tap, n)
         for name in part.part_model.input_types:
             signal = part.part_model.tap(name).signal
             if signal in sample_code.signals and f"x_{signal}" in read:
@@ -160,12 +164,23 @@ class March:
                 known[graph.name(f"x_{signal}")] = code.in_all_lanes(now)
         return known
 
-    def _past(self, tap: TapOf, lane: int, age: int, n: str) -> str:
+    def _keep(self, tap: TapOf, n: str, known: Mapping[Node, str]) -> None:
+        """Keep a signal between parts, which a tap reads later, in its line."""
+        part = self.sample_code.parts[tap.part]
+        (text,) = self.code.floats([part.tapped(tap)], dict(known))
+        place = self.code.put(f"mul i64 {n}, {self._lanes}")
+        self.code.store(text, self._between[tap.between], place)
+
+    def _line(self, tap: TapOf, n: str) -> Callable[[str, int], str]:
+        """What reads a tap's signal at any age."""
+        return lambda age, lane: self._past(tap, lane, age, n)
+
+    def _past(self, tap: TapOf, lane: int, age: str, n: str) -> str:
         """What a signal was some samples before sample n, or before its record."""
         code, signals = self.code, self.sample_code.signals
         delay = code.load("%delay_samples", tap.number * self._lanes + lane, "i64")
         at = code.put(f"sub i64 {n}, {delay}")
-        at = code.put(f"sub i64 {at}, {age}") if age else at
+        at = code.put(f"sub i64 {at}, {age}") if age != "0" else at
         inside = code.put(f"icmp sge i64 {at}, 0")
         place = code.put(f"select i1 {inside}, i64 {at}, i64 0")
         if tap.between < 0:
@@ -239,7 +254,8 @@ class March:
             for source in sample_code.sources
             if source.part != last.part
         ]
-        if passed and not together:
+        closed = any(tap.tap.late for tap in sample_code.late)
+        if passed and not together and not closed:
             variables = {node: code.variable(code.constant(0.0)) for node in passed}
             with code.loop("0", code.put("add i64 %count, 1")) as at:
                 late = {node: code.load(variable) for node, variable in variables.items()}

@@ -17,6 +17,7 @@ from swashplate.machine.graph import LEAVES, Node, names_in, ordered
 from swashplate.machine.language import is_named_tuple
 from swashplate.machine.model import (
     Equation,
+    History,
     Link,
     Model,
     SignalSource,
@@ -25,10 +26,12 @@ from swashplate.machine.model import (
     arguments_of,
     linear,
     mean_over_sample,
+    newest,
     previous,
 )
 
 HOLDS: dict[str, Equation] = {
+    "none": newest,
     "linear": linear,
     "previous": previous,
     "mean": mean_over_sample,
@@ -180,6 +183,9 @@ class PartCode:
                 return graph.ZERO
             return dict(leaves(self.p))[self.part_model.defaults[name]]
         samples = tuple(map(graph.name, self.tap_samples(record_tap)))
+        if tap.longest:
+            longest = graph.make("/", dict(leaves(self.p))[tap.longest], graph.name("h"))
+            return History._make((samples[0], longest))
         fraction = graph.name(self.delay_fraction(record_tap))
         window = Window._make((samples, fraction))
         return window if tap.width else self._call(HOLDS[tap.hold], window=window)
@@ -362,6 +368,8 @@ class PartCode:
         for name in part_model.input_types:
             if name in part_model.defaults:
                 inputs[name] = dict(leaves(self.p))[part_model.defaults[name]]
+            elif part_model.tap(name).longest:
+                inputs[name] = History._make((graph.ZERO, graph.ZERO))
             elif part_model.tap(name).width:
                 zeros = (graph.ZERO,) * part_model.tap(name).width
                 inputs[name] = Window._make((zeros, graph.ZERO))
@@ -374,6 +382,8 @@ class PartCode:
     def _held(self, tap: TapOf) -> Value:
         """What a tap gives of a signal between parts that does not change."""
         now = self.tapped(tap)
+        if tap.tap.longest:
+            return History._make((now, graph.ZERO))
         return Window._make(((now,) * tap.tap.width, graph.ZERO)) if tap.tap.width else now
 
 

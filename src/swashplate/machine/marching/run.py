@@ -7,6 +7,7 @@ from collections.abc import Callable, Collection, Iterator, Mapping, Sequence, S
 from dataclasses import dataclass, field, fields
 from functools import cached_property, lru_cache
 from itertools import count
+from math import isclose
 from types import MappingProxyType
 from typing import Any, Literal, NamedTuple, TypeVar
 
@@ -41,8 +42,10 @@ from swashplate.machine.marching.sample_code import (
     output_of,
 )
 from swashplate.machine.model import (
+    History,
     Link,
     Model,
+    Tap,
     Window,
     arguments_of,
     parameter_paths,
@@ -58,6 +61,8 @@ Array = NDArray[np.float64]
 Start = Literal["rest", "steady"]
 T = TypeVar("T")
 
+MOST_PASSES = 200
+"""Passes over the parts until what comes late of those behind has settled."""
 MOST_CACHED = 128
 """Results that an instance keeps before it forgets all."""
 NO_NUMBER = (ValueError, ZeroDivisionError, OverflowError)
@@ -331,6 +336,11 @@ class Machine:
             slope=np.array([delay.slope for delay in delays], dtype=np.float64),
         )
 
+    def longest_past(self, signals: Sequence[str]) -> float:
+        """How far back equations read the past of an input at an age that changes. [s]"""
+        taps = [tap for tap in taps_of(self.model, tuple(signals)) if tap.tap.longest]
+        return max((value_at(self.parts[tap.part].p, tap.tap.longest) for tap in taps), default=0.0)
+
     def number_at(self, stored: SignalId, signals_before: Mapping[str, float], h: float) -> float:
         """Number that is known ahead of a sample, of constant records; 0 for a tap's fraction."""
         numbers = self.parts[stored.part]
@@ -396,6 +406,51 @@ class Machine:
     ) -> InitialStates:
         check_start(start)
         self.check_inputs(first)
+        late = self._before()
+        for _ in range(MOST_PASSES if start == "steady" else 1):
+            initial = self._pass(first, h, start, states_given, late)
+            settled = self._late(initial)
+            if all(isclose(settled[at], late[at], rel_tol=1e-14) for at in late):
+                return initial
+            if start == "steady":
+                late = settled
+        if start == "steady":
+            raise DomainError(
+                f"{self.name}: its parts act back on each other, and do not settle under these "
+                "inputs; start at rest."
+            )
+        return initial
+
+    def _before(self) -> dict[tuple[int, str], float]:
+        """What each signal that comes late was before the record, by part and input."""
+        before = dict[tuple[int, str], float]()
+        for index, part in enumerate(self.model.parts):
+            for name, tap in part.taps.items():
+                if tap.late:
+                    p = self.parts[index].p
+                    before[index, name] = float(value_at(p, tap.before)) if tap.before else 0.0
+        return before
+
+    def _late(self, initial: InitialStates) -> dict[tuple[int, str], float]:
+        """What each signal that comes late is at a start."""
+        now = dict[tuple[int, str], float]()
+        for index, name in self._before():
+            link = self.model.link_of(index, name)
+            if link is not None:
+                now[index, name] = linked(
+                    link, initial.states, initial.arguments, self.model.replacements
+                )
+        return now
+
+    def _pass(
+        self,
+        first: Mapping[str, float],
+        h: float,
+        start: Start,
+        states_given: Sequence[Any] | None,
+        late: Mapping[tuple[int, str], float],
+    ) -> InitialStates:
+        """A start, with what comes late of parts behind."""
         signals_before = {
             name: value if start == "steady" else 0.0 for name, value in first.items()
         }
@@ -412,17 +467,18 @@ class Machine:
             for name in part.input_types:
                 tap = part.tap(name)
                 link = self.model.link_of(index, name)
-                if link is not None:
+                if link is not None and tap.late:
+                    value = late[index, name]
+                    between[tap.signal] = value
+                elif link is not None:
                     value = linked(link, states, arguments_of_parts, self.model.replacements)
                     if name in part.taps:
                         value = between[tap.signal] = value if start == "steady" else 0.0
-                    arguments[name] = Window((value,) * tap.width, 0.0) if tap.width else value
-                    continue
-                if tap.signal in first:
+                elif tap.signal in first:
                     value = (signals_before if name in part.taps else first)[tap.signal]
                 else:
                     value = float(value_at(numbers.p, part.defaults[name]))
-                arguments[name] = Window((value,) * tap.width, 0.0) if tap.width else value
+                arguments[name] = held_input(tap, value, numbers.p, h)
             if part.inputs is not None:
                 arguments["inputs"] = part.inputs(*(arguments[name] for name in part.input_types))
             if states_given is None:
@@ -503,6 +559,13 @@ class Machine:
             raise DomainError(
                 f"{self.name}: {equation.__name__} cannot be computed for these numbers ({error})."
             ) from None
+
+
+def held_input(tap: Tap, value: float, p: Any, h: float) -> float | Window | History:
+    """What an equation is given of an input that has always had one value."""
+    if tap.longest:
+        return History(value, float(value_at(p, tap.longest)) / h)
+    return Window((value,) * tap.width, 0.0) if tap.width else value
 
 
 def options_of(part: Model, p: Any, options: Any, touched: Set[str] | None = None) -> Any:

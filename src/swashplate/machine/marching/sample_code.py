@@ -106,15 +106,18 @@ class SampleCode:
                 self.ends[output.part] += part.limits
             else:
                 self.ends[output.part].append(part.node(output))
-        for part in reversed(self.parts):
-            if self.ends[part.part]:
-                self._settle(part)
+        settled = [0 for _ in self.parts]
+        while settled != [len(ends) for ends in self.ends]:  # signals that come late: again
+            for part in reversed(self.parts):
+                if len(self.ends[part.part]) != settled[part.part]:
+                    self._settle(part)
+                    settled[part.part] = len(self.ends[part.part])
         self.used = [part for part in self.parts if self.ends[part.part]]
 
     def _settle(self, part: PartCode) -> None:
         """Find out what a part's results follow from: its states, and signals of other parts."""
-        ends, carried = self.ends[part.part], set[str]()
-        ends += [] if part.margin is None else [part.margin]
+        ends, carried = self.ends[part.part], {*self.carried[part.part]}
+        ends += [] if part.margin is None or part.margin in ends else [part.margin]
         state, following = dict(leaves(part.state)), dict(leaves(part.following))
         while True:
             read = names_in(ends)
@@ -125,7 +128,7 @@ class SampleCode:
             ends += [following[path] for path in state if path in new]
         self.carried[part.part] = [path for path in state if path in carried]
         for tap in part.between:
-            if not read.isdisjoint(part.tap_samples(tap)):
+            if not read.isdisjoint(part.tap_samples(tap)) and tap not in self.late:
                 self.late.append(tap)
         late = {tap.input for tap in self.late if tap.part == part.part}
         for name in part.part_model.input_types:

@@ -21,6 +21,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from ctypes import CFUNCTYPE, c_void_p
 from functools import partial
+from math import ceil
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -116,7 +117,7 @@ PREPARE_KINDS = ("float", *(FLOATS,) * 4)
 """Kinds of the arguments of `march.PREPARE_ARGUMENTS`."""
 _STEP = CFUNCTYPE(None, c_void_p)
 ROOM = 500
-"""Samples that are put behind each other before they are moved."""
+"""Least number of samples that are put behind each other before they are moved."""
 
 
 def call_step(context: StepContext) -> None:
@@ -244,9 +245,10 @@ class CompiledStep:
         constants = np.zeros(self._count)
         self._prepare(self._h, delays.fraction, instance.params, instance.given, constants)
         longest = int(delays.samples.max(initial=0)) + OLDEST
+        longest += ceil(instance.longest_past(self.inputs) / self._h)
         initial = instance.start(values, self._h, start)
         before = np.array([*initial.before.values(), *initial.between.values()])
-        lines = np.tile(before[:, None], longest + ROOM)
+        lines = np.tile(before[:, None], longest + max(ROOM, longest))
         return StepContext(
             inputs=newest,
             outputs=np.zeros(len(self.outputs)),

@@ -137,6 +137,11 @@ class Carried:
                 if f"{prefix}{path}" in number_of:
                     column_of[node] = number_of[f"{prefix}{path}"]
             for tap in part.taps:
+                if f"{prefix}{tap.tap.before}" in number_of and tap.tap.before:
+                    raise InputError(
+                        f"{prefix}{tap.tap.before} is what a signal was before the record: there "
+                        "are no derivatives by it."
+                    )
                 if f"{prefix}{tap.tap.delay}" in number_of:
                     fraction = graph.name(part.delay_fraction(tap))
                     column_of[fraction] = number_of[f"{prefix}{tap.tap.delay}"]
@@ -205,11 +210,12 @@ class Carried:
                 self.groups[node] |= self.groups.get(self.between[number], set())
 
     def _in_order(self) -> list[Node]:
-        """All vertices; a signal between parts comes before what reads it through a tap."""
+        """All vertices; a signal between parts comes before what reads it as it is now."""
 
         def followed(node: Node) -> list[Node]:
             if node in self.past:
-                return [self.between[self.past[node][2]]]
+                tap, _, number = self.past[node]
+                return [] if tap.tap.late else [self.between[number]]
             return [*self.flows.get(node, ())]
 
         if not self.past:
