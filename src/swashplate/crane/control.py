@@ -22,6 +22,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from swashplate.crane.axes import RATE
+from swashplate.crane.closed_loop.seeing import Sensing
 from swashplate.crane.crew import HumanOperator
 from swashplate.errors import InputError
 from swashplate.machine import Model
@@ -66,18 +67,6 @@ GIVES = ("tip_x", "tip_y")
 """Signals of a user-defined controller: what it adds to the reference tip, ship's frame. [m]"""
 
 
-class Sensing(NamedTuple):
-    """Numbers of `Sensors`, as the loop takes them."""
-
-    rate: float = 0.0
-    """Measurements a sample of the loop; 0 without sensors."""
-    delay: float = 0.0
-    """[samples of the loop]"""
-    rope_angle: float = 0.0
-    motion: float = 0.0
-    """Root mean square noise. [rad]"""
-
-
 class Settings(NamedTuple):
     """Numbers of a controller, as the loop takes them."""
 
@@ -92,8 +81,8 @@ class Settings(NamedTuple):
     clip: float = 0.0
     """[m]; 0: from the limits, by `share`; no clip if that is 0, too."""
     share: float = 0.0
-    sensing: Sensing = Sensing()
-    crew: HumanOperator = HumanOperator()
+    sensing: Sensing | None = None
+    crew: HumanOperator | None = None
 
 
 class Control:
@@ -336,6 +325,7 @@ class Sensors(Control):
             delay=float(self.delay) * RATE,
             rope_angle=radians(self.rope_angle_noise_deg),
             motion=radians(self.motion_noise_deg),
+            longest=float(self.delay) + 1.0 / float(self.rate) + 4.0 / RATE,
         )
 
 
@@ -398,7 +388,7 @@ class Crew(Control):
         """As the loop takes it."""
         return HumanOperator(
             gain=float(self.gain),
-            delay=round(self.delay * RATE),
+            delay=round(self.delay * RATE) / RATE,
             threshold=radians(self.threshold_deg),
             share=float(self.share),
             lag=float(self.lag),

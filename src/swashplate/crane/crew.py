@@ -16,78 +16,39 @@ of the numbers was measured on a crane's operator; `Crew` gives where they come 
 
 from __future__ import annotations
 
-from math import sqrt
+from math import cos, sin, sqrt
 from typing import NamedTuple
 
-import numpy as np
-from numpy.typing import NDArray
-
-from swashplate.crane.kinematics import Boom, Geometry, Vector, reach_rate
+from swashplate.crane.closed_loop.steering import Drivable
+from swashplate.crane.kinematics import Boom, Geometry, Vector, reach_rate, rotation, to_ship
+from swashplate.crane.motion import SHIP, Ship
 from swashplate.crane.rope import GRAVITY
-from swashplate.machine import equation, inlined
-
-Array = NDArray[np.float64]
-
-HANG, HAND, COMMANDED = range(3)
-"""Rows of the crew's state, across the boom and along it: swing that is taken for rest [m], speed
-of the tip for which the hand asks [m/s], shaft angles of slew and luff by the command alone
-[rad]."""
+from swashplate.machine import Model, Tap, equation
 
 
 class HumanOperator(NamedTuple):
-    """Numbers of a `Crew`, as the loop takes them."""
+    """Numbers of a `Crew`."""
 
-    gain: float = 0.0
-    """Speed of the tip for each metre of swing; 0 without a crew. [1/s]"""
-    delay: int = 0
-    """[samples of the loop]"""
-    threshold: float = 0.0
+    gain: float
+    """Speed of the tip for each metre of swing. [1/s]"""
+    delay: float
+    """[s]"""
+    threshold: float
     """[rad]"""
-    share: float = 1.0
+    share: float
     """Of what the drives can follow."""
-    lag: float = 0.1
+    lag: float
     """[s]"""
-    return_time: float = 30.0
+    return_time: float
     """[s]"""
 
 
-class Drivable(NamedTuple):
-    """Limits of a drive's shaft."""
+class Boomwise(NamedTuple):
+    """Components of a horizontal vector, as slew and luff move them."""
 
-    low: float
-    high: float
-    """[rad/s]"""
-    acceleration: float
-    """[rad/s²]"""
-
-
-class View(NamedTuple):
-    """What the operator sees, each across the boom and along it, of slew and luff."""
-
-    swing: tuple[float, float]
-    """Load less tip. [m]"""
-    plumb: tuple[float, float]
-    """The same of a load at rest. [m]"""
-    rope: float
-    """[m]"""
-    shafts: tuple[float, float]
-    """[rad]"""
-    arms: tuple[float, float]
-    """Metres of the tip for each radian of the shaft."""
-
-
-class CrewMemory(NamedTuple):
-    """State of a crew, which the loop changes."""
-
-    state: Array
-    """(3, 2), rows `HANG`, `HAND` and `COMMANDED`."""
-    wanted: Array
-    """(2, n) speeds of the tip on their way from eye to hand, n a power of two. [m/s]"""
-
-
-def new_memory(delay: int) -> CrewMemory:
-    """Memory of a crew before its first sample, at rest; the delay is in samples of the loop."""
-    return CrewMemory(np.zeros((3, 2)), np.zeros((2, 1 << (delay + 1).bit_length())))
+    across: float
+    """To starboard of a boom that points forward."""
+    along: float
 
 
 @equation
@@ -102,60 +63,225 @@ def followable_speed(speed: float, acceleration: float, omega: float) -> float:
     return min(speed, acceleration / omega)
 
 
-@inlined
-def boomwise(v: Vector, bearing: tuple[float, float]) -> tuple[float, float]:
-    """Components across the boom, to starboard of one that points forward, and along it."""
-    c, s = bearing
-    return -v.x * s - v.y * c, v.x * c - v.y * s
+@equation
+def boomwise(v: Vector, slew: float) -> Boomwise:
+    """Components across the boom and along it, at a slew from forward [rad]."""
+    c, s = cos(slew), sin(slew)
+    return Boomwise(-v.x * s - v.y * c, v.x * c - v.y * s)
 
 
-@inlined
-def view_of(
-    hangs: tuple[Vector, Vector],
-    rope: float,
-    bearing: tuple[float, float],
-    boom: Boom,
-    shafts: tuple[float, float],
-    g: Geometry,
-) -> View:
-    """View from the cab, which rolls with the ship.
-
-    Load less tip as it hangs, and as it would at rest, in the ship's axes [m]; cosine and sine of
-    the slew; angles of the shafts of slew and luff [rad].
-    """
-    # metres of the tip for each radian of the shaft: boom up is inwards
-    arms = (g.foot + g.boom * boom.cos, -reach_rate(boom, g))
-    return View(boomwise(hangs[0], bearing), boomwise(hangs[1], bearing), rope, shafts, arms)
+@equation
+def arms(boom: Boom, g: Geometry) -> Boomwise:
+    """Metres of the tip for each radian of the shafts of slew and luff: boom up is inwards."""
+    return Boomwise(g.foot + g.boom * boom.cos, -reach_rate(boom, g))
 
 
-@inlined
-def catch_swing(
-    reference: Array,
-    view: View,
-    drives: tuple[Drivable, Drivable],
-    memory: CrewMemory,
-    operator: HumanOperator,
-    sample: int,
-    h: float,
-) -> None:
-    """Add what the crew asks of slew and luff to the command's reference speeds. [rad/s]"""
-    state = memory.state
-    omega = sqrt(GRAVITY / view.rope)
-    last = memory.wanted.shape[1] - 1
-    for i in range(2):
-        if sample == 0:
-            state[HANG, i] = view.plumb[i]
-        else:
-            state[COMMANDED, i] += h * reference[i + 1]
-        state[HANG, i] += h / operator.return_time * (view.swing[i] - state[HANG, i])
-        out = beyond_threshold(view.swing[i] - state[HANG, i], operator.threshold * view.rope)
-        away = view.arms[i] * (view.shafts[i] - state[COMMANDED, i])
-        speed = operator.gain * out - away / operator.return_time
-        arm = abs(view.arms[i])
-        full = arm * min(drives[i].high, -drives[i].low)
-        most = operator.share * followable_speed(full, arm * drives[i].acceleration, omega)
-        memory.wanted[i, sample & last] = min(max(speed, -most), most)
-        late = memory.wanted[i, (sample - operator.delay) & last]
-        state[HAND, i] += h / operator.lag * (late - state[HAND, i])
-        shaft_speed = reference[i + 1] + state[HAND, i] / view.arms[i]
-        reference[i + 1] = min(max(shaft_speed, drives[i].low), drives[i].high)
+# --- eye ------------------------------------------------------------------------------------------
+
+
+class Eye(NamedTuple):
+    """The operator, and what the crane can do."""
+
+    operator: HumanOperator
+    slew: Drivable
+    luff: Drivable
+    geometry: Geometry
+    ship: Ship = Ship()
+
+
+class EyeInputs(NamedTuple):
+    """Command [rad/s], and view from the cab, which rolls with the ship; as of `seeing.View`."""
+
+    reference_slew: float
+    reference_luff: float
+    swing_x: float
+    swing_y: float
+    swing_z: float
+    rope: float
+    slew: float
+    boom_cos: float
+    boom_sin: float
+    shaft_slew: float
+    shaft_luff: float
+    roll: float
+    pitch: float
+    yaw: float
+
+
+class EyeState(NamedTuple):
+    """What the operator remembers."""
+
+    samples: float = 0.0
+    """1 after the first one."""
+    hang: Boomwise = Boomwise(0.0, 0.0)
+    """Swing that is taken for rest. [m]"""
+    commanded: Boomwise = Boomwise(0.0, 0.0)
+    """Shaft angles of slew and luff by the command alone. [rad]"""
+
+
+class Wanted(NamedTuple):
+    """Speeds of the tip that the operator wants, before they reach the hand. [m/s]"""
+
+    wanted_across: float
+    wanted_along: float
+    hang: Boomwise
+    commanded: Boomwise
+
+
+@equation
+def most_speed(arm: float, omega: float, drive: Drivable, p: HumanOperator) -> float:
+    """Speed of the tip for which the operator asks at most. [m/s]"""
+    full = abs(arm) * min(drive.high, -drive.low)
+    return p.share * followable_speed(full, abs(arm) * drive.acceleration, omega)
+
+
+@equation
+def wanted(
+    swing: float, hang: float, away: float, most: float, rope: float, p: HumanOperator
+) -> float:
+    """Speed of the tip in one direction, for a swing and how far it is from its place. [m/s]"""
+    out = beyond_threshold(swing - hang, p.threshold * rope)
+    speed = p.gain * out - away / p.return_time
+    return min(max(speed, -most), most)
+
+
+@equation
+def looked(state: EyeState, inputs: EyeInputs, p: Eye, h: float) -> Wanted:
+    """What the operator sees and wants."""
+    r = rotation(inputs.roll, inputs.pitch, inputs.yaw)
+    swing_vector = Vector(inputs.swing_x, inputs.swing_y, inputs.swing_z)
+    swing = boomwise(to_ship(r, swing_vector), inputs.slew)
+    plumb = boomwise(to_ship(r, Vector(0.0, 0.0, -inputs.rope)), inputs.slew)
+    arm = arms(Boom(inputs.boom_cos, inputs.boom_sin), p.geometry)
+    started = state.samples > 0.5
+    hang = state.hang if started else plumb
+    moves = h if started else 0.0
+    commanded = Boomwise(
+        state.commanded.across + moves * inputs.reference_slew,
+        state.commanded.along + moves * inputs.reference_luff,
+    )
+    adapts = h / p.operator.return_time
+    hang = Boomwise(
+        hang.across + adapts * (swing.across - hang.across),
+        hang.along + adapts * (swing.along - hang.along),
+    )
+    omega = sqrt(GRAVITY / inputs.rope)
+    return Wanted(
+        wanted(
+            swing.across,
+            hang.across,
+            arm.across * (inputs.shaft_slew - commanded.across),
+            most_speed(arm.across, omega, p.slew, p.operator),
+            inputs.rope,
+            p.operator,
+        ),
+        wanted(
+            swing.along,
+            hang.along,
+            arm.along * (inputs.shaft_luff - commanded.along),
+            most_speed(arm.along, omega, p.luff, p.operator),
+            inputs.rope,
+            p.operator,
+        ),
+        hang,
+        commanded,
+    )
+
+
+@equation
+def eye_step(signals: Wanted) -> EyeState:
+    """Keep a sample for the next one."""
+    return EyeState(1.0, signals.hang, signals.commanded)
+
+
+eye = Model(
+    "eye",
+    parameters=Eye,
+    state=EyeState,
+    step=eye_step,
+    sample=looked,
+    inputs=EyeInputs,
+    defaults={name: SHIP[name] for name in ("roll", "pitch", "yaw")},
+)
+
+# --- hand -----------------------------------------------------------------------------------------
+
+
+class Hand(NamedTuple):
+    """The operator's hand, and the drives."""
+
+    delay: float
+    """From eye to hand. [s]"""
+    lag: float
+    """[s]"""
+    slew: Drivable
+    luff: Drivable
+    geometry: Geometry
+
+
+class HandInputs(NamedTuple):
+    """Command [rad/s], what the eye wanted [m/s], and the boom."""
+
+    reference_slew: float
+    reference_luff: float
+    wanted_across: float
+    wanted_along: float
+    boom_cos: float
+    boom_sin: float
+
+
+class HandState(NamedTuple):
+    """Speed of the tip for which the hand asks. [m/s]"""
+
+    speed: Boomwise = Boomwise(0.0, 0.0)
+
+
+class Moved(NamedTuple):
+    """Reference speeds with what the hand adds. [rad/s]"""
+
+    reference_slew: float
+    reference_luff: float
+    speed: Boomwise
+    """[m/s]"""
+
+
+@equation
+def within(speed: float, drive: Drivable) -> float:
+    """Speed of a shaft within its drive's limits. [rad/s]"""
+    return min(max(speed, drive.low), drive.high)
+
+
+@equation
+def moved(state: HandState, inputs: HandInputs, p: Hand, h: float) -> Moved:
+    """What hand and command ask of slew and luff."""
+    arm = arms(Boom(inputs.boom_cos, inputs.boom_sin), p.geometry)
+    follows = h / p.lag
+    speed = Boomwise(
+        state.speed.across + follows * (inputs.wanted_across - state.speed.across),
+        state.speed.along + follows * (inputs.wanted_along - state.speed.along),
+    )
+    return Moved(
+        within(inputs.reference_slew + speed.across / arm.across, p.slew),
+        within(inputs.reference_luff + speed.along / arm.along, p.luff),
+        speed,
+    )
+
+
+@equation
+def hand_step(signals: Moved) -> HandState:
+    """Keep a sample for the next one."""
+    return HandState(signals.speed)
+
+
+hand = Model(
+    "hand",
+    parameters=Hand,
+    state=HandState,
+    step=hand_step,
+    sample=moved,
+    inputs=HandInputs,
+    taps={
+        "wanted_across": Tap("wanted_across", delay="delay", hold="none"),
+        "wanted_along": Tap("wanted_along", delay="delay", hold="none"),
+    },
+)

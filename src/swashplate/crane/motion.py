@@ -46,6 +46,21 @@ class Travel(NamedTuple):
     highest: Annotated[float, Definition("sine of the boom's highest elevation", "1")]
 
 
+class Ship(NamedTuple):
+    """Motion of a ship where none is given: it is at rest."""
+
+    surge: Annotated[float, Definition("ship forward, if it is not given", "m")] = 0.0
+    sway: Annotated[float, Definition("ship to port, if it is not given", "m")] = 0.0
+    heave: Annotated[float, Definition("ship up, if it is not given", "m")] = 0.0
+    roll: Annotated[float, Definition("roll of the ship, if it is not given", "rad")] = 0.0
+    pitch: Annotated[float, Definition("pitch of the ship, if it is not given", "rad")] = 0.0
+    yaw: Annotated[float, Definition("yaw of the ship, if it is not given", "rad")] = 0.0
+
+
+SHIP = {name: f"ship.{name}" for name in Ship._fields}
+"""Parameter that stands for each motion of the ship if it is not given."""
+
+
 class Body(NamedTuple):
     """Boom, rope and load, and where they begin."""
 
@@ -55,6 +70,7 @@ class Body(NamedTuple):
     start: Start
     mass: Annotated[float, Definition("mass of load and hook", "kg", above=0.0)]
     travel: Travel
+    ship: Ship = Ship()
 
 
 class BodyInputs(NamedTuple):
@@ -343,6 +359,7 @@ body = Model(
     sample=body_sample,
     settled=body_settled,
     inputs=BodyInputs,
+    defaults=SHIP,
     limits=body_limits,
     domain=body_domain,
     outside="the boom's tip moves within one sample by more than the rope lets the load follow",

@@ -17,6 +17,7 @@ from .code_generation.derivatives import Derived as Derived
 from .code_generation.derivatives import declared as declared
 from .code_generation.derivatives import derive as derive
 from .code_generation.loops import interpolate as interpolate
+from .code_generation.loops import past as past
 from .code_generation.loops import repeated as repeated
 from .code_generation.loops import root as root
 from .declaration import equation as equation
@@ -26,6 +27,7 @@ from .declaration import with_replacements as with_replacements
 from .fields import Definition as Definition
 from .fields import Flag as Flag
 from .joining import join as join
+from .joining import late as late
 from .kernels import kernel as kernel
 from .linear.frequency_response import sweep as sweep
 from .linear.linearisation import linearize as linearize
@@ -39,6 +41,7 @@ from .marching.simulation import Stepper as Stepper
 from .marching.simulation import simulate as simulate
 from .marching.simulation import stepper as stepper
 from .model import Equation as Equation
+from .model import History as History
 from .model import Link as Link
 from .model import Model as Model
 from .model import SignalSource as SignalSource

@@ -132,7 +132,8 @@ class Tap(NamedTuple):
     late: int = 0
     """Samples by which a signal of another part comes later, see `swashplate.machine.late`."""
     before: str = ""
-    """Path of the parameter that is a late signal before the record; by default it is zero."""
+    """Path of the parameter that a signal of another part was before the record, unless it has
+    settled; by default zero."""
 
     @property
     def samples(self) -> int:

@@ -12,9 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swashplate.crane.axes import AXES, RATE, check_names
-from swashplate.crane.closed_loop.loop import Fixed
+from swashplate.crane.closed_loop.stepper import Fixed
 from swashplate.crane.closed_loop.signals import ROWS, Signals
-from swashplate.crane.closed_loop.stepper import ACTUATIONS
 from swashplate.crane.crane import Crane
 from swashplate.crane.rope import GRAVITY, in_ship_axes, rope_leads, swing_of
 from swashplate.crane.sea.transfer_functions import MOTIONS
@@ -104,7 +103,7 @@ class CraneRun(Tabular):
 
     @cached_property
     def _signals(self) -> Signals:
-        return Signals(self.stored, self.fixed.columns, self.fixed.geometry, self.fixed.home)
+        return Signals(self.stored, self.fixed.columns)
 
     @cached_property
     def out(self) -> Array:
@@ -140,7 +139,7 @@ class CraneRun(Tabular):
     @property
     def actuation(self) -> str:
         """Actuation that turned reference speeds into speeds, as of `RunOptions`."""
-        return ACTUATIONS[self.fixed.actuation]
+        return self.fixed.actuation
 
     @cached_property
     def time(self) -> Array:

@@ -1,4 +1,4 @@
-"""Signals of a crane's run: what the loop stores of each sample, and what follows from that."""
+"""Signals of a crane's run, by name."""
 
 from __future__ import annotations
 
@@ -9,8 +9,6 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from swashplate.crane.kinematics import Geometry, Home, Shafts, boom_at, rope_length
-from swashplate.machine import kernel
 from swashplate.results import Result
 
 Array = NDArray[np.float64]
@@ -26,37 +24,37 @@ ROWS = (
 )
 """Signals of a run by name, SI; the torques are those that the drives have taken."""
 
-SPEED, SHAFT, TIP, LOAD, PULL = 0, 3, 6, 9, 12
-"""First columns of what the loop stores of every run: four groups of three, and the pull."""
+THREES = ("speed", "shaft", "tip", "load")
+"""Groups of three signals that are stored of every run, one after the other."""
+SINGLES = ("pull", "rope", "boom_cos", "boom_sin")
+"""Signals that are stored of every run after these."""
 ABSENT = -1
-BOOM_AND_ROPE = ("rope", "boom_cos", "boom_sin")
-"""Signals that follow from the angles of the shafts."""
 PARTS = {"hoist": 0, "slew": 1, "luff": 2, "x": 0, "y": 1, "z": 2}
 """Position of an axis in its group."""
 
 
 class Columns(NamedTuple):
-    """Columns that the loop stores only of some runs, `ABSENT` if it does not."""
+    """First columns of the groups that are stored only of some runs, `ABSENT` if they are not."""
 
-    voltage: int
-    """First of the three voltages; ideal drives have none."""
     limits: int
-    """First of the limits of the three drives; ideal ones have none."""
+    """Of the three drives; ideal ones have none."""
+    voltage: int
+    """Ideal drives have none; with direct actuation they are the commands."""
     hook: int
-    """First of the hook with slings; without one it is the position of the load."""
+    """With slings; without one it is the position of the load."""
     torque: int
-    """First of the torques, if the rope loads the drives."""
+    """If the rope loads the drives."""
     width: int
     """Number of columns, with those of every run."""
 
 
 def columns_of(*, ideal: bool, hooked: bool, loaded: bool) -> Columns:
-    """Columns that the loop stores of a run."""
-    width = PULL + 1
+    """Columns that are stored of a run."""
+    width = 3 * len(THREES) + len(SINGLES)
     first_columns = {}
     for group, present in (
-        ("voltage", not ideal),
         ("limits", not ideal),
+        ("voltage", not ideal),
         ("hook", hooked),
         ("torque", loaded),
     ):
@@ -65,33 +63,13 @@ def columns_of(*, ideal: bool, hooked: bool, loaded: bool) -> Columns:
     return Columns(**first_columns, width=width)
 
 
-@kernel
-def _boom_and_rope(shafts: Array, g: Geometry, home: Home, out: Array) -> None:
-    """Rope, cosine and sine of the boom at angles of the shafts."""
-    for n in range(len(shafts)):
-        now = Shafts(shafts[n, 0], shafts[n, 1], shafts[n, 2])
-        boom = boom_at(now.luff, g, home)
-        out[n, 0] = rope_length(now, g, home)
-        out[n, 1] = boom.cos
-        out[n, 2] = boom.sin
-
-
 @dataclass(frozen=True, eq=False)
 class Signals(Result):
     """Signals by their names of `ROWS`, each computed when it is asked for."""
 
     stored: Array
-    """(n, `columns.width`) what the loop has stored."""
+    """(n, `columns.width`)"""
     columns: Columns
-    geometry: Geometry
-    home: Home
-
-    @cached_property
-    def _boom_and_rope(self) -> Array:
-        columns = np.empty((len(self.stored), 3))
-        _boom_and_rope(self.stored[:, SHAFT : SHAFT + 3], self.geometry, self.home, columns)
-        columns.flags.writeable = False
-        return columns
 
     @cached_property
     def _zeros(self) -> Array:
@@ -101,25 +79,18 @@ class Signals(Result):
 
     def three(self, group: str) -> Array:
         """(n, 3) the signals of a group: ``"speed"`` of hoist, slew and luff, ``"tip"``."""
-        columns = self.columns
-        first = {
-            "voltage": columns.voltage,
-            "speed": SPEED,
-            "limits": columns.limits,
-            "shaft": SHAFT,
-            "tip": TIP,
-            "load": LOAD,
-            "hook": LOAD if columns.hook == ABSENT else columns.hook,
-            "torque": columns.torque,
-        }[group]
+        if group == "hook" and self.columns.hook == ABSENT:
+            group = "load"
+        if group in THREES:
+            first = 3 * THREES.index(group)
+        else:
+            first = getattr(self.columns, group)
         return self._zeros if first == ABSENT else self.stored[:, first : first + 3]
 
     def __getitem__(self, name: str) -> Array:
         """(n,) a signal of `ROWS`."""
-        if name == "pull":
-            return self.stored[:, PULL]
-        if name in BOOM_AND_ROPE:
-            return self._boom_and_rope[:, BOOM_AND_ROPE.index(name)]
+        if name in SINGLES:
+            return self.stored[:, 3 * len(THREES) + SINGLES.index(name)]
         group, _, axis = name.partition("_")
         return self.three(group)[:, PARTS[axis]]
 

@@ -7,7 +7,6 @@ from typing import NamedTuple, Unpack
 from numpy.typing import ArrayLike
 
 from swashplate.crane.axes import RATE
-from swashplate.crane.closed_loop.loop import DIRECT, IDEAL
 from swashplate.crane.closed_loop.operator_command import Array, OperatorCommand
 from swashplate.crane.closed_loop.result import CraneRun
 from swashplate.crane.closed_loop.stepper import CraneStepper, RunOptions
@@ -86,7 +85,7 @@ class PreparedRun(NamedTuple):
 def prepare(crane: Crane, command: OperatorCommand, options: RunOptions) -> PreparedRun:
     """A run before its first sample; it refuses what `simulate` refuses of crane and command."""
     stepper = CraneStepper(crane, **options)
-    if stepper.fixed.actuation == DIRECT:
+    if stepper.fixed.actuation == "direct":
         raise InputError(
             "With direct actuation commands are voltages, but a stick gives fractions of full "
             "speed: use a CraneStepper, or actuation='volts'."
@@ -97,7 +96,7 @@ def prepare(crane: Crane, command: OperatorCommand, options: RunOptions) -> Prep
             "OperatorCommand.rest(60)."
         )
     commands, end = command.sample(crane, stepper.fixed.home, RATE)
-    if stepper.fixed.actuation == IDEAL and commands[0].any():
+    if stepper.fixed.actuation == "ideal" and commands[0].any():
         raise InputError(
             "Ideal drives follow instantaneously, and the crane starts at rest: a recorded stick "
             "must begin at zero, so put a row of zeros before it."

@@ -2,37 +2,55 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import lru_cache
-from math import degrees, pi, sqrt
-from typing import Any, Literal, Unpack, get_args
+from math import degrees
+from typing import Any, Literal, NamedTuple, Unpack, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from swashplate.analysis import InverseMap
 from swashplate.crane.axes import AXES, RATE, check_names
-from swashplate.crane.closed_loop import loop
-from swashplate.crane.closed_loop.loop import Fixed, Inverse, LoopArrays, State
-from swashplate.crane.closed_loop.signals import ROWS, Signals, columns_of
-from swashplate.crane.control import GIVES, SEEN, Control, stages_of
+from swashplate.crane.closed_loop.joined import (
+    NOISE,
+    SHIP,
+    STICK,
+    VOLTAGES,
+    Loop,
+    closed_loop,
+)
+from swashplate.crane.closed_loop.seeing import ROUNDING
+from swashplate.crane.closed_loop.signals import (
+    ABSENT,
+    ROWS,
+    SINGLES,
+    THREES,
+    Columns,
+    Signals,
+    columns_of,
+)
+from swashplate.crane.control import GIVES, Control, Settings, stages_of
 from swashplate.crane.crane import Crane
-from swashplate.crane.crew import new_memory
-from swashplate.crane.kinematics import Shafts, Vector, boom_at, rope_length, shaft_torques, tip_of
-from swashplate.crane.machines import Placing, body_numbers
-from swashplate.crane.motion import Body, BrakeState
-from swashplate.crane.rope import GRAVITY, hanging_load, swing_of, too_fast_sentence
+from swashplate.crane.kinematics import Geometry, Home
+from swashplate.crane.machines import SPEED, Placing, body_numbers
+from swashplate.crane.motion import Body
+from swashplate.crane.rope import Hanging, swing_of, too_fast_sentence
 from swashplate.drive import Drive
 from swashplate.errors import DomainError, InputError
-from swashplate.machine import Machine
-from swashplate.machine.marching import CompiledStep, StepContext, compiled_step, marched, stored_of
+from swashplate.machine.marching import (
+    CompiledStep,
+    StepContext,
+    bound_step,
+    stored_of,
+    unchecked_march,
+)
 from swashplate.parameters import FULL_VOLTAGE
 
 Array = NDArray[np.float64]
 Actuation = Literal["ideal", "volts", "inverse", "direct"]
 ACTUATIONS: tuple[str, ...] = get_args(Actuation)
-"""In the order of `loop.IDEAL` and the others."""
-OUTPUTS = ("shaft_speed", "limits")
-"""Signals of each drive that the loop uses."""
+NO_NUMBER, ROPE_OUT, BOOM_OUT, TOO_FAST = "number", "rope", "boom", "fast"
+"""What stops a run; of two at one sample the first."""
 QUICKEST = 0.4
 """Largest part of a rope's pull by which a leaking drive may lower it within a sample: at 0.7 they
 would swing against each other from sample to sample."""
@@ -67,6 +85,35 @@ class RunOptions(Placing, total=False):
     brake: bool
 
 
+class Fixed(NamedTuple):
+    """Quantities that stay constant during a run."""
+
+    geometry: Geometry
+    home: Home
+    settings: Settings
+    actuation: str
+    boom: tuple[float, float]
+    """Sines of the boom's limits."""
+    ropes: tuple[float, float]
+    """Limits of the rope. [m]"""
+    mass: float
+    """Of load and hook. [kg]"""
+    hanging: Hanging
+    loaded: bool
+    """Whether the rope's tension loads the drives."""
+    columns: Columns
+
+
+class _Stepped(NamedTuple):
+    """A compiled step under way."""
+
+    step: CompiledStep
+    context: StepContext
+    advance: Callable[[], None]
+    noise: np.random.Generator
+    """Of the sensors, one stream for the whole run."""
+
+
 class CraneStepper:
     """A crane that takes commands and gives signals, the same numbers as `simulate`.
 
@@ -90,62 +137,20 @@ class CraneStepper:
         check_names("A crane's run has no", keywords, RunOptions.__annotations__, "it has")
         control = keywords.pop("control", None)
         settings, controller, sensors = stages_of(control)
-        fixed = _fixed(crane, settings, **keywords)
+        brake = bool(keywords.pop("brake", True))
+        numbers, fixed = _fixed(crane, settings, **keywords)
+        if fixed.actuation == "direct" and control is not None:
+            raise InputError("With direct actuation the voltages are given: leave control out.")
         self._crane = crane
         self.fixed = fixed
-        if fixed.actuation == loop.DIRECT and control is not None:
-            raise InputError("With direct actuation the voltages are given: leave control out.")
-        inputs = ("voltage", "load_torque") if fixed.loaded else ("voltage",)
-        compiled = [_compiled(getattr(crane, axis), inputs) for axis in AXES]
-        self._steps = [step for step, _ in compiled]
-        hoist, slew, luff = (context.copied() for _, context in compiled)
-        user = hoist
-        picks = np.zeros(0, dtype=np.int64)
-        if controller is not None:
-            names = controller.model.external
-            step = compiled_step(Machine(controller.model, controller.values), names, GIVES, RATE)
-            self._steps.append(step)
-            user = step.context()
-            picks = np.array([SEEN.index(name) for name in names], dtype=np.int64)
-        # in open loop nothing acts back on the drives
-        self._open = (
-            not settings.path
-            and settings.crew.gain == 0.0
-            and not fixed.loaded
-            and fixed.actuation in (loop.VOLTS, loop.INVERSE)
-        )
-        g = fixed.geometry
-        home = fixed.home
-        axes = np.zeros((6, 3))
-        boom = boom_at(0.0, g, home)
-        tip = tip_of(home.slew, boom, g)
-        if fixed.loaded:
-            weight = fixed.mass * GRAVITY
-            axes[loop.TORQUE] = shaft_torques(Vector(0.0, 0.0, -weight), home.slew, boom, weight, g)
-        rope = float(rope_length(Shafts(0.0, 0.0, 0.0), g, home))
-        start = fixed.start
-        hung = hanging_load(tip, start.offset_x, start.offset_y, rope, fixed.hanging)
-        self._state = State(0, axes, tip, hung, BrakeState())
-        longest = 2.0 * pi * sqrt(fixed.ropes[1] / GRAVITY) * RATE + 4.0
-        memory = np.zeros((4, 1 << int(longest).bit_length()))
-        memory[loop.PATH : loop.PATH + 2] = [[tip.x], [tip.y]]
-        # the load has hung at its initial position
-        memory[loop.SWING : loop.SWING + 2] = [[hung.hook.x - tip.x], [hung.hook.y - tip.y]]
-        sensing = settings.sensing
-        on_their_way = int(sensing.delay * sensing.rate) + 2
-        self._noise = np.random.default_rng(0 if sensors is None else sensors.seed)
-        self._arrays = LoopArrays(
-            drives=(hoist, slew, luff),
-            controller=user,
-            controlled=controller is not None,
-            picks=picks,
-            memory=memory,
-            readings=np.zeros((1 << on_their_way.bit_length(), loop.READINGS)),
-            noise=np.zeros((0, loop.NOISY)),
-            crew=new_memory(settings.crew.delay),
-            margins=np.full(4, np.inf),
-            marched=(np.zeros(0),) * 9,
-        )
+        self._direct = fixed.actuation == "direct"
+        loop = Loop(settings, controller, fixed.actuation, fixed.loaded, brake)
+        self._machine = closed_loop(crane, numbers, loop)
+        self._outputs = stored_of(self._machine.model, _outputs(fixed, loop))
+        self._given = len(GIVES) if controller is not None else 0
+        self._seed = 0 if sensors is None else sensors.seed
+        self._stepped: _Stepped | None = None
+        self._samples = 0
 
     def step(
         self, command: tuple[float, float, float], ship: ArrayLike | None = None
@@ -178,7 +183,7 @@ class CraneStepper:
         >>> stepper.step((0.0, 1.0, 0.0))["rope"]
         20.0
         """
-        most = FULL_VOLTAGE if self.fixed.actuation == loop.DIRECT else 1.0
+        most = FULL_VOLTAGE if self._direct else 1.0
         commands = np.array([command], dtype=np.float64)
         if commands.shape != (1, 3) or not (np.abs(commands) <= most).all():
             raise InputError(f"A crane takes three commands of at most ±{most:g}.")
@@ -194,92 +199,135 @@ class CraneStepper:
         tip = np.array([signals[f"tip_{axis}"] for axis in "xyz"])
         return signals | {"swing": float(swing_of(load, tip))}
 
-    def signals(self, stored: Array) -> Signals:
-        """Signals by name, of rows that the loop has stored."""
-        return Signals(stored, self.fixed.columns, self.fixed.geometry, self.fixed.home)
-
     def take(self, commands: Array, ship: Array) -> Array:
         """Advance by many samples: a row for each, a column for each of `step`'s signals.
 
         Commands are (n, 3), the ship's motion (n, 6), or (n, 1) if it does not move.
         """
-        out = np.empty((len(commands), self.fixed.columns.width))
-        return self.signals(self._advanced(self.fixed, commands, ship, out)).table()
+        if self._stepped is None:
+            self._stepped = self._start()
+        step, context, advance, noise = self._stepped
+        sensing = self.fixed.settings.sensing
+        table = np.empty((len(self._outputs), len(commands)))
+        for n, command in enumerate(commands):
+            context.inputs[:3] = command
+            context.inputs[3:9] = ship[n] if ship.shape[1] > 1 else 0.0
+            if sensing is not None and _measures(self._samples, sensing.rate):
+                context.inputs[9:] = noise.standard_normal(len(NOISE))
+            advance()
+            table[:, n] = context.outputs
+            self._refuse(table[:, n : n + 1], self._samples)
+            step.check(context, float(context.margin[0]), "command")
+            self._samples += 1
+        return Signals(self._stored(table, commands), self.fixed.columns).table()
 
     def run(self, commands: Array, ship: Array) -> Array:
-        """March a complete run and return its stored signals, by `Fixed.columns`.
+        """March a complete run and return its stored signals, by `Fixed.columns`."""
+        inputs = self._inputs(commands, ship)
+        start = self._machine.start(dict.fromkeys(inputs, 0.0), 1.0 / RATE, "rest")
+        table, check = unchecked_march(
+            self._machine, inputs, 1.0 / RATE, start, self._outputs, "command"
+        )
+        self._refuse(table, 0)
+        check()
+        return self._stored(table, commands)
 
-        As `take`; the stepper cannot be used after it.
+    def _start(self) -> _Stepped:
+        """The compiled step before its first sample."""
+        names = (*(VOLTAGES if self._direct else STICK), *SHIP)
+        names += NOISE if self.fixed.settings.sensing is not None else ()
+        step = CompiledStep(self._machine, names, self._outputs, 1.0 / RATE)
+        context = step.context()
+        return _Stepped(step, context, bound_step(context), np.random.default_rng(self._seed))
+
+    def _inputs(self, commands: Array, ship: Array) -> dict[str, Array]:
+        """What the machine of a complete run is given."""
+        names = VOLTAGES if self._direct else STICK
+        inputs = {name: np.ascontiguousarray(commands[:, i]) for i, name in enumerate(names)}
+        if ship.shape[1] > 1:
+            inputs |= {name: np.ascontiguousarray(ship[:, i]) for i, name in enumerate(SHIP)}
+        sensing = self.fixed.settings.sensing
+        if sensing is not None:
+            measures = _measures(np.arange(len(commands)), sensing.rate)
+            noise = np.zeros((len(commands), len(NOISE)))
+            drawn = np.random.default_rng(self._seed).standard_normal((measures.sum(), len(NOISE)))
+            noise[measures] = drawn
+            inputs |= {name: np.ascontiguousarray(noise[:, i]) for i, name in enumerate(NOISE)}
+        return inputs
+
+    def _stored(self, table: Array, commands: Array) -> Array:
+        """What is stored of a run, by `Fixed.columns`, of the machine's outputs, a row each."""
+        first = self.fixed.columns.voltage
+        if self._direct:
+            table = np.concatenate([table[:first], commands.T, table[first:]])
+        return table[: self.fixed.columns.width].T
+
+    def _refuse(self, table: Array, samples: int) -> None:
+        """Refuse a run that meets an end of travel, or control that gives no numbers.
+
+        `samples` are those before the table's first. Whatever comes after is no motion of a crane.
         """
         fixed = self.fixed
-        out = np.empty((len(commands), fixed.columns.width))
-        if self._open:  # the drives by themselves, which is quicker
-            self._arrays = self._arrays._replace(marched=self._marched_drives(commands))
-            fixed = fixed._replace(actuation=loop.MARCHED)
-        return self._advanced(fixed, commands, ship, out)
+        _, rope, cosine, sine = table[3 * len(THREES) :][: len(SINGLES)]
+        within = (fixed.boom[0] <= sine) & (sine <= fixed.boom[1]) & (cosine > 0.0)
+        wrong = {
+            NO_NUMBER: ~np.isfinite(table[len(table) - self._given :]).all(axis=0),
+            ROPE_OUT: ~((fixed.ropes[0] <= rope) & (rope <= fixed.ropes[1])),
+            BOOM_OUT: ~within,
+            TOO_FAST: table[3 * len(THREES)] < 0.0,
+        }
+        first = {reason: int(np.argmax(found)) for reason, found in wrong.items() if found.any()}
+        if not first:
+            return
+        reason = min(first, key=lambda each: first[each])
+        raise self._stopped(reason, samples + first[reason], float(rope[first[reason]]))
 
-    def _marched_drives(self, commands: Array) -> tuple[Array, ...]:
-        """Voltages, speeds and limits of the three drives, which nothing acts back on."""
-        h = 1.0 / RATE
-        voltages = []
-        speeds = []
-        limits = []
-        for i, axis in enumerate(AXES):
-            stick = np.ascontiguousarray(commands[:, i])
-            volts = loop.open_voltages(stick, self.fixed.inverses[i], self.fixed.actuation)
-            instance = getattr(self._crane, axis)
-            start = instance.start({"voltage": 0.0}, h, "rest")
-            outputs = stored_of(instance.model, OUTPUTS)
-            rows = marched(instance, {"voltage": volts}, h, start, outputs, "command")
-            voltages.append(volts)
-            speeds.append(np.ascontiguousarray(rows[0]))
-            limits.append(np.ascontiguousarray(rows[1]))
-        return (*voltages, *speeds, *limits)
-
-    def _advanced(self, fixed: Fixed, commands: Array, ship: Array, out: Array) -> Array:
-        """The rows, filled by the loop; refuses what has stopped it."""
-        arrays = self._arrays._replace(noise=self._next_noise(len(commands)))
-        self._state, ended = loop.advance_crane(
-            1.0 / RATE, fixed, self._state, arrays, commands, ship, out
-        )
-        if ended != loop.FINE:
-            raise self._stopped(ended)
-        contexts = (*self._arrays.drives, self._arrays.controller)
-        margins = self._arrays.margins.tolist()
-        for step, context, worst in zip(self._steps, contexts, margins, strict=False):
-            step.check(context, worst, "command")
-        return out
-
-    def _next_noise(self, samples: int) -> Array:
-        """Noise of the measurements within the next samples, from one stream for the whole run."""
-        sample = self._state.sample
-        rate = self.fixed.settings.sensing.rate
-        if rate == 0.0 or samples == 0:
-            return self._arrays.noise
-        taken = loop.measurement_at(sample - 1, rate) + 1 if sample > 0 else 0
-        due = loop.measurement_at(sample + samples - 1, rate) + 1
-        return self._noise.standard_normal((due - taken, loop.NOISY))
-
-    def _stopped(self, ended: int) -> Exception:
-        """The error to raise for the reason why the loop has stopped."""
+    def _stopped(self, reason: str, sample: int, rope: float) -> Exception:
+        """The error to raise for what has stopped a run at a sample."""
         crane = self._crane
-        time = self._state.sample / RATE
-        hoist, slew, luff = self._state.axes[loop.ANGLE]
-        shafts = Shafts(hoist, slew, luff)
-        rope = float(rope_length(shafts, self.fixed.geometry, self.fixed.home))
-        if ended == loop.TOO_FAST:
+        time = sample / RATE
+        if reason == TOO_FAST:
             return InputError(too_fast_sentence(rope, time, RATE))
         short, long = crane.rope_limits
         low, high = map(degrees, crane.boom_limits)
         reasons = {
-            loop.NO_NUMBER: "the controller gives an offset of the tip that is not a finite "
+            NO_NUMBER: "the controller gives an offset of the tip that is not a finite "
             "number; check it for a division by zero or a root of a negative number in it",
-            loop.ROPE_OUT: f"the rope is {rope:.2f} m long, but can be {short:g} to {long:g} m; "
+            ROPE_OUT: f"the rope is {rope:.2f} m long, but can be {short:g} to {long:g} m; "
             "hoist or lower less, or start elsewhere",
-            loop.BOOM_OUT: f"the boom meets the limits of its travel, {low:g} to {high:g} deg; "
+            BOOM_OUT: f"the boom meets the limits of its travel, {low:g} to {high:g} deg; "
             "luff less, or start elsewhere",
         }
-        return DomainError(f"{crane.name}: at {time:.2f} s {reasons[ended]}.")
+        return DomainError(f"{crane.name}: at {time:.2f} s {reasons[reason]}.")
+
+
+def _measures(samples: Any, rate: float) -> Any:
+    """Whether sensors measure at samples, of which the first is number 0."""
+    now = np.floor(samples * rate + ROUNDING)
+    before = np.floor((samples - 1) * rate + ROUNDING)
+    return (samples == 0) | (np.maximum(now, 0.0) > np.maximum(before, 0.0))
+
+
+def _outputs(fixed: Fixed, loop: Loop) -> list[str]:
+    """Signals of the joined machine in the order of `Fixed.columns`, then the controller's."""
+    speeds = [f"{axis}.{SPEED}" for axis in AXES]
+    ideal = fixed.actuation == "ideal"
+    if loop.brake and not ideal:
+        speeds[0] = "brake.braked_speed"
+    outputs = [*speeds, *(f"body.shaft_{axis}" for axis in AXES)]
+    outputs += [f"body.{point}_{axis}" for point in ("tip", "load") for axis in "xyz"]
+    outputs += [f"body.{name}" for name in SINGLES]
+    if not ideal:
+        outputs += [f"{axis}.limits" for axis in AXES]
+        if fixed.actuation != "direct":
+            outputs += [f"{axis}_command.command" for axis in AXES]
+    if fixed.columns.hook != ABSENT:
+        outputs += [f"body.hook_{axis}" for axis in "xyz"]
+    if fixed.loaded:
+        outputs += [f"view.torque_{axis}" for axis in AXES]
+    if loop.controller is not None:
+        outputs += [f"controller.{name}" for name in GIVES]
+    return outputs
 
 
 def _fixed(
@@ -288,10 +336,9 @@ def _fixed(
     *,
     actuation: Actuation = "inverse",
     loaded: bool | None = None,
-    brake: bool = True,
     **placing: Unpack[Placing],
-) -> Fixed:
-    """Check the options of a run, `RunOptions`, and make its constants of them."""
+) -> tuple[Body, Fixed]:
+    """Check the options of a run, `RunOptions`: where it begins, and its constants."""
     if actuation not in ACTUATIONS:
         raise InputError(f"actuation is '{actuation}'; it is {', '.join(ACTUATIONS[:-1])}.")
     numbers = body_numbers(crane, **placing)
@@ -299,21 +346,17 @@ def _fixed(
         loaded = actuation != "ideal" and feels_load(crane)
     if loaded:
         _check_loaded(crane, actuation, numbers)
-    hoist, slew, luff = (_inverse(crane.inverse(axis)) for axis in AXES)
     travel = numbers.travel
-    return Fixed(
+    return numbers, Fixed(
         geometry=numbers.geometry,
         home=numbers.home,
         settings=settings,
-        actuation=ACTUATIONS.index(actuation),
-        brake=bool(brake),
+        actuation=actuation,
         boom=(travel.lowest, travel.highest),
         ropes=(travel.shortest, travel.longest),
         mass=numbers.mass,
         hanging=numbers.hanging,
-        start=numbers.start,
         loaded=bool(loaded),
-        inverses=(hoist, slew, luff),
         columns=columns_of(
             ideal=actuation == "ideal",
             hooked=numbers.hanging.sling > 0.0,
@@ -344,13 +387,6 @@ def _check_loaded(crane: Crane, actuation: str, numbers: Body) -> None:
             )
 
 
-@lru_cache(maxsize=64)
-def _compiled(drive: Drive, inputs: tuple[str, ...]) -> tuple[CompiledStep, StepContext]:
-    """A drive's step, and its context at the start to copy."""
-    step = drive.compiled_step(OUTPUTS, inputs=inputs, rate=RATE)
-    return step, step.context()
-
-
 def feels_load(crane: Crane) -> bool:
     """Whether a drive of a crane turns in another way if its shaft is loaded."""
     drives = [getattr(crane, axis) for axis in AXES]
@@ -364,18 +400,3 @@ def _speed_lost(drive: Drive) -> float:
     unloaded = drive.simulate([0.0], load_torque=0.0)
     loaded = drive.simulate([0.0], load_torque=torque)
     return float(unloaded.shaft_speed[0] - loaded.shaft_speed[0]) / torque
-
-
-def _inverse(inverse: InverseMap) -> Inverse:
-    """An inverse map as the loop takes it."""
-    speed, voltage = np.hstack([inverse.minus, inverse.plus])
-    low, high = inverse.limits
-    return Inverse(
-        speed=speed,
-        voltage=voltage,
-        gap=inverse.minus.speed.size - 1,
-        creep=inverse.creep,
-        low=low,
-        high=high,
-        acceleration=min(inverse.acceleration),
-    )

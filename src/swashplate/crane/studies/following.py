@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from swashplate.crane.axes import AXES
-from swashplate.crane.closed_loop.loop import largest_sine
+from swashplate.crane.closed_loop.steering import largest_sine
 from swashplate.crane.crane import Crane
 from swashplate.crane.kinematics import boom_at, reach_rate, tip_of
 from swashplate.crane.sea.seaway import SEA_STATES, Seaway, Spectrum

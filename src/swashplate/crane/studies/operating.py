@@ -493,7 +493,7 @@ def _linear(case: Case, sea: Seaway, limits: Mapping[str, float]) -> _Linear:
     demands = [name for name in DEMANDS if name in values and (case.driven or name == "clip")]
     demand = max((values[name].largest for name in demands), default=0.0)
     operator = stages_of(control).settings.crew
-    if operator.gain > 0.0:  # not linear in any waves in which it sees the swing
+    if operator is not None:  # not linear in any waves in which it sees the swing
         without = _linear(case.changed(control=None), sea, limits)
         seen = max(without.slope["off_lead"], without.slope["side_lead"])
         idle = _Idle(operator.threshold / NEAR / seen if seen > 0.0 else np.inf, without)

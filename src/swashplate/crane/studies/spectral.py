@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swashplate.crane.axes import RATE
-from swashplate.crane.closed_loop.loop import largest_sine
+from swashplate.crane.closed_loop.steering import largest_sine
 from swashplate.crane.control import Control, Settings, stages_of
 from swashplate.crane.crane import Crane
 from swashplate.crane.crew import HumanOperator
@@ -156,7 +156,7 @@ def linear_response(
             "The frequency domain supports delayed feedback and ship compensation, not the "
             f"user-defined controller {controller.model.name}: simulate it."
         )
-    crewed = settings.crew.gain > 0.0
+    crewed = settings.crew is not None
     if crewed and settings.path:
         raise InputError(
             "The frequency domain supports a crew or control of the tip, not the crew's hand "
@@ -274,7 +274,7 @@ def _controlled(
     moved = (0.0 if settings.ship else 1.0) * tip[:2]
     natural = sqrt(GRAVITY / rope)
     feedback = settings.feedback * np.exp(-2j * pi * settings.delay * omega / natural)
-    if settings.crew.gain > 0.0:
+    if settings.crew is not None:
         feedback = crew_response(omega, settings.crew)
         moved = moved + feedback * rope * plumb
     stiffness = natural**2 - omega**2 * (1.0 + feedback) + 2j * damping * natural * omega
@@ -285,7 +285,7 @@ def _controlled(
 def crew_response(omega: Array, operator: HumanOperator) -> Complex:
     """Offset of the tip over the swing that a crew without threshold sees, on ideal drives."""
     s = 1j * omega
-    hand = np.exp(-s * operator.delay / RATE) / (1.0 + operator.lag * s)
+    hand = np.exp(-s * operator.delay) / (1.0 + operator.lag * s)
     beyond_rest = operator.return_time * s / (1.0 + operator.return_time * s)
     return np.asarray(operator.gain * beyond_rest * hand / (s + hand / operator.return_time))
 

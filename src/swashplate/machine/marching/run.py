@@ -473,7 +473,8 @@ class Machine:
                 elif link is not None:
                     value = linked(link, states, arguments_of_parts, self.model.replacements)
                     if name in part.taps:
-                        value = between[tap.signal] = value if start == "steady" else 0.0
+                        rest = float(value_at(numbers.p, tap.before)) if tap.before else 0.0
+                        value = between[tap.signal] = value if start == "steady" else rest
                 elif tap.signal in first:
                     value = (signals_before if name in part.taps else first)[tap.signal]
                 else:
@@ -745,6 +746,26 @@ def marched(
     what drives the model, for the message if it leaves its domain or a number overflows. The same
     march computes `further` numbers if `everything` is wanted; they follow in the table.
     """
+    table, check = unchecked_march(
+        instance, records, h, initial, stored, cause, begin, further=further, everything=everything
+    )
+    check()
+    return table
+
+
+def unchecked_march(
+    instance: Machine,
+    records: Mapping[str, Array],
+    h: float,
+    initial: InitialStates,
+    stored: tuple[SignalId, ...],
+    cause: str = "input",
+    begin: Mapping[str, float] = MappingProxyType({}),
+    *,
+    further: tuple[SignalId, ...] = (),
+    everything: bool = False,
+) -> tuple[Array, Callable[[], None]]:
+    """The table of `marched`, and what refuses it if it leaves the domain or is not finite."""
     signals = tuple(records)
     size = next(iter(records.values())).size
     rows = [*zip((*stored, *further), count(), strict=False)]
@@ -770,9 +791,12 @@ def marched(
         table.reshape(-1),
     )
     planned()(size, 0, h, *arrays)
-    check_domain(instance, states, float(worst_margin[0]), cause)
-    check_outputs(instance, stored, table, h, cause)
-    return table
+
+    def check() -> None:
+        check_domain(instance, states, float(worst_margin[0]), cause)
+        check_outputs(instance, stored, table, h, cause)
+
+    return table, check
 
 
 def check_outputs(

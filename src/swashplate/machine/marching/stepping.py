@@ -312,12 +312,19 @@ def compiled_step(
 
 
 def stored_of(model: Model, outputs: Sequence[str]) -> tuple[SignalId, ...]:
-    """Where the outputs of a step come from; ``"limits"`` of the last part that has any."""
+    """Where the outputs of a step come from.
+
+    ``"limits"`` are of the last part that has any, ``"hoist.limits"`` of the last one of a member.
+    """
     ids = []
     limited = [index for index, part in enumerate(model.parts) if part.limits is not None]
     for output in outputs:
-        if output == "limits" and limited:
-            ids.append(SignalId(limited[-1], "limits"))
+        member, _, last = f".{output}".rpartition(".")
+        has_limits = [
+            index for index in limited if f".{model.parts[index].path}.".startswith(f"{member}.")
+        ]
+        if last == "limits" and has_limits:
+            ids.append(SignalId(has_limits[-1], "limits"))
             continue
         stored, integral = output_of(model, output)
         if integral:
