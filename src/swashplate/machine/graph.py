@@ -9,6 +9,8 @@ Besides arithmetic there are
 - "if": one of two values, by a test; `and` and `or` are choices with a literal side;
 - "past": what a value was, of the value now and its age in samples, which changes;
 - "element": one of several values, by its number from 0, which is the first operand;
+- "segment": the number of the last of several rising values that is not above the first operand,
+  but not of the last value of all, 0 if there is none;
 - "ruled": a value whose derivatives are declared, by the `DerivativeRule` in the node's `value`;
 - "call" of an equation apart, and "result", one of the numbers that it returns.
 """
@@ -105,7 +107,7 @@ def _kind(op: str, operands: tuple[Node, ...]) -> str:
         return "bool"
     if op == "ruled":
         return operands[0].kind
-    if op in ("call", "result"):
+    if op in ("call", "result", "segment"):
         return "float"
     kinds = {operand.kind for operand in (operands[1:] if op in CHOSEN else operands)}
     if op == "floor" or (kinds == {"int"} and op not in ("/", *MATH_FUNCTIONS)):

@@ -180,6 +180,15 @@ class Link(NamedTuple):
         return max(source.part for source in self.sources)
 
 
+class AtRest(NamedTuple):
+    """What states at rest follow from."""
+
+    inputs: frozenset[str]
+    """Inputs of the part."""
+    gives: bool
+    """Whether signals of the part are among it."""
+
+
 @dataclass(frozen=True, eq=False)
 class Model:
     """A machine as equations over named tuples of floats; see the module's text.
@@ -383,6 +392,22 @@ class Model:
                 before[part.full(name)] = SignalSource(index, name)
         return found
 
+    @cached_property
+    def at_rest(self) -> tuple[AtRest, ...]:
+        """Of each part what states at rest follow from, its own or another part's."""
+        needed = [AtRest(frozenset(), gives=False) for _ in self.parts]
+        for index in range(len(self.parts) - 1, -1, -1):
+            part, gives = self.parts[index], needed[index].gives
+            read = arguments_of(part.rest) if part.rest is not None else ()
+            everything = gives or "inputs" in read
+            inputs = frozenset(n for n in part.input_types if everything or n in read)
+            needed[index] = AtRest(inputs, gives=gives)
+            for name in inputs:
+                link = self.link_of(index, name)
+                for source in link.sources if link is not None else ():
+                    needed[source.part] = needed[source.part]._replace(gives=True)
+        return tuple(needed)
+
     def prefix(self, part: int) -> str:
         """What stands before a part's paths: where it stands and a dot, in a joined model."""
         return f"{self.parts[part].path}." if self.is_joined else ""
@@ -541,8 +566,16 @@ class Model:
 
     def tap(self, name: str) -> Tap:
         """How an input is looked at."""
-        tap = self.taps.get(name, Tap(name))
-        return tap._replace(signal=self.wired[name]) if name in self.wired else tap
+        if name not in self._taps:
+            tap = self.taps.get(name, Tap(name))
+            wired = name in self.wired
+            self._taps[name] = tap._replace(signal=self.wired[name]) if wired else tap
+        return self._taps[name]
+
+    @cached_property
+    def _taps(self) -> dict[str, Tap]:
+        """How inputs are looked at, as far as it was asked."""
+        return {}
 
     @property
     def equations(self) -> tuple[Equation, ...]:

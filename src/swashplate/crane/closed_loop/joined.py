@@ -63,7 +63,7 @@ def closed_loop(crane: Crane, numbers: Body, loop: Loop) -> Machine:
     links: dict[str, Any] = {}
 
     def add(name: str, model: Any, numbers: Any, **wires: Any) -> None:
-        members[name] = Machine(model, numbers)
+        members[name] = numbers if isinstance(numbers, Machine) else Machine(model, numbers)
         links.update({f"{name}.{taken}": given for taken, given in wires.items()})
 
     first = _first(numbers, loaded=loop.loaded)
@@ -114,8 +114,8 @@ def closed_loop(crane: Crane, numbers: Body, loop: Loop) -> Machine:
             case "volts":
                 add(f"{axis}_command", steering.straight, drivable[axis], **reference)
             case "inverse":
-                inverse = _inverse(crane.inverse(axis))
-                add(f"{axis}_command", steering.inverse, inverse, **reference)
+                inverse = _inverse_machine(crane.inverse(axis))
+                add(f"{axis}_command", inverse.model, inverse, **reference)
         if loop.actuation != "direct":
             links[f"{axis}.voltage"] = f"{axis}_command.command"
         members[axis] = getattr(crane, axis)
@@ -123,7 +123,7 @@ def closed_loop(crane: Crane, numbers: Body, loop: Loop) -> Machine:
             links[f"{axis}.load_torque"] = f"view.torque_{axis}"
     speeds = {axis: f"{axis}.{SPEED}" for axis in AXES}
     if loop.brake and loop.actuation != "ideal":
-        inverse = _inverse(crane.inverse("hoist"))
+        inverse = _inverse_numbers(crane.inverse("hoist"))
         given = "hoist.voltage" if loop.actuation == "direct" else "hoist_command.command"
         edges = Brake(inverse.edge_down, inverse.edge_up)
         add("brake", brake_model, edges, voltage=given, speed=speeds["hoist"])
@@ -233,8 +233,14 @@ def _drivable(inverse: InverseMap) -> steering.Drivable:
 
 
 @lru_cache(maxsize=64)
-def _inverse(inverse: InverseMap) -> steering.Inverse:
-    """An inverse map as the loop takes it."""
+def _inverse_machine(inverse: InverseMap) -> Machine:
+    """What turns reference speeds into voltages."""
+    return Machine(steering.inverse, _inverse_numbers(inverse))
+
+
+@lru_cache(maxsize=64)
+def _inverse_numbers(inverse: InverseMap) -> steering.Inverse:
+    """An inverse map as a model takes it."""
     speed, voltage = np.hstack([inverse.minus, inverse.plus])
     if speed.size != steering.POINTS:
         raise InputError(

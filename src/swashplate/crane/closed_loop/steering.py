@@ -159,7 +159,7 @@ def shaped(line: History, half: float, p: Impulses) -> float:
     """A signal through impulses that are `half` samples apart."""
     total = 0.0
     if p.first > 0.0:
-        total += p.first * past(line, 0.0)
+        total += p.first * line.newest
     if p.second > 0.0:
         total += p.second * past(line, half)
     if p.third > 0.0:

@@ -268,13 +268,17 @@ class CraneStepper:
         `samples` are those before the table's first. Whatever comes after is no motion of a crane.
         """
         fixed = self.fixed
-        _, rope, cosine, sine = table[3 * len(THREES) :][: len(SINGLES)]
-        within = (fixed.boom[0] <= sine) & (sine <= fixed.boom[1]) & (cosine > 0.0)
+        pull, rope, cosine, sine = table[3 * len(THREES) :][: len(SINGLES)]
+        given = table[len(table) - self._given :]
+        inside = fixed.ropes[0] <= rope.min() and rope.max() <= fixed.ropes[1]
+        inside &= fixed.boom[0] <= sine.min() and sine.max() <= fixed.boom[1]
+        if inside and cosine.min() > 0.0 <= pull.min() and np.isfinite(given).all():
+            return
         wrong = {
-            NO_NUMBER: ~np.isfinite(table[len(table) - self._given :]).all(axis=0),
+            NO_NUMBER: ~np.isfinite(given).all(axis=0),
             ROPE_OUT: ~((fixed.ropes[0] <= rope) & (rope <= fixed.ropes[1])),
-            BOOM_OUT: ~within,
-            TOO_FAST: table[3 * len(THREES)] < 0.0,
+            BOOM_OUT: ~((fixed.boom[0] <= sine) & (sine <= fixed.boom[1]) & (cosine > 0.0)),
+            TOO_FAST: pull < 0.0,
         }
         first = {reason: int(np.argmax(found)) for reason, found in wrong.items() if found.any()}
         if not first:

@@ -330,6 +330,8 @@ class Code:
                 return self._choice(node, operands, texts)
             case "element":
                 return self._element(operands, texts)
+            case "segment":
+                return self._segment(operands, texts)
             case "past":
                 return self._past(operands[0], *texts)
         floats = [
@@ -354,22 +356,75 @@ class Code:
         return self.select(test, *sides)
 
     def _element(self, operands: Sequence[Node], texts: Sequence[str]) -> str:
-        """One of several numbers: from where they stand one after the other, or are put so."""
+        """One of several numbers, by its number."""
         place, *elements = map(self._as_float, operands, texts)
-        places = [self.places.get(node) for node in operands[1:]]
+        at = self._one_after_the_other(operands[1:], elements)
+        found = []
+        for lane in range(self.wide or 1):
+            number = self.put(f"fptosi double {self.element(place, lane)} to i64")
+            found.append(at(number, lane))
+        return self.joined(found)
+
+    def _segment(self, operands: Sequence[Node], texts: Sequence[str]) -> str:
+        """The segment of a table that a number is in, walked to from the one before.
+
+        From sample to sample it is most often the same: a processor guesses that, and goes on.
+        """
+        x, *knots = map(self._as_float, operands, texts)
+        at = self._one_after_the_other(operands[1:], knots)
+        found = []
+        for lane in range(self.wide or 1):
+            number, walked = self.element(x, lane), self._lasting()
+
+            def goes_up(number: str = number, walked: str = walked, lane: int = lane) -> str:
+                here = self.load(walked, 0, "i32")
+                following = self.put(f"add i32 {here}, 1")
+                knot = at(self.put(f"zext i32 {following} to i64"), lane)
+                beyond = self.put(f"fcmp oge double {number}, {knot}")
+                inside = self.put(f"icmp slt i32 {here}, {len(knots) - 2}")
+                return self.put(f"and i1 {beyond}, {inside}")
+
+            def goes_down(number: str = number, walked: str = walked, lane: int = lane) -> str:
+                here = self.load(walked, 0, "i32")
+                knot = at(self.put(f"zext i32 {here} to i64"), lane)
+                below = self.put(f"fcmp olt double {number}, {knot}")
+                inside = self.put(f"icmp sgt i32 {here}, 0")
+                return self.put(f"and i1 {below}, {inside}")
+
+            for goes_on, step in ((goes_up, 1), (goes_down, -1)):
+                with self.as_long_as(goes_on):
+                    here = self.load(walked, 0, "i32")
+                    self.store(self.put(f"add i32 {here}, {step}"), walked, 0, "i32")
+            found.append(self.put(f"sitofp i32 {self.load(walked, 0, 'i32')} to double"))
+        return self.joined(found)
+
+    def _lasting(self) -> str:
+        """Address of a whole number that is 0 where the function begins."""
+        self._count += 1
+        name = f"%v{self._count}"
+        self._slots += [f"  {name} = alloca i32, align 8", f"  store i32 0, ptr {name}"]
+        return name
+
+    def _one_after_the_other(
+        self, nodes: Sequence[Node], texts: Sequence[str]
+    ) -> Callable[[str, int], str]:
+        """What loads one of several numbers, by its number and lane.
+
+        From where they stand one after the other, or are put so.
+        """
+        places, lanes = [self.places.get(node) for node in nodes], self.wide or 1
         first = places[0]
-        lanes = self.wide or 1
         if first and places == [(first[0], first[1] + k * lanes) for k in range(len(places))]:
             array, begin = first
         else:
-            array, begin = self._array(elements), 0
-        found = []
-        for lane in range(lanes):
-            number = self.put(f"fptosi double {self.element(place, lane)} to i64")
-            number = self.put(f"mul i64 {number}, {lanes}")
+            array, begin = self._array(texts), 0
+
+        def at(number: str, lane: int) -> str:
+            number = self.put(f"mul i64 {number}, {lanes}") if lanes > 1 else number
             number = self.put(f"add i64 {number}, {begin + lane}")
-            found.append(self.load(array, number, "double"))
-        return self.joined(found)
+            return self.load(array, number, "double")
+
+        return at
 
     def _past(self, newest: Node, now: str, age: str) -> str:
         """What a value was at an age in samples, straight between them."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from bisect import bisect_right
 from collections.abc import Callable, Mapping, Sequence
 from functools import reduce
 from math import inf
@@ -114,10 +115,7 @@ def interpolate(x: float, knots: tuple[float, ...], values: tuple[float, ...]) -
     float
         The value. At a knot the derivative by x is the slope to the right of it.
     """
-    at = 0
-    for i in range(1, len(knots) - 1):
-        if x >= knots[i]:
-            at = i
+    at = max(min(bisect_right(knots, x), len(knots) - 1) - 1, 0)
     share = (x - knots[at]) / (knots[at + 1] - knots[at])
     return values[at] + min(max(0.0, share), 1.0) * (values[at + 1] - values[at])
 

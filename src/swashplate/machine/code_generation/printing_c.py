@@ -57,7 +57,7 @@ HUGE_VAL HUGE_VALF HUGE_VALL MATH_ERRNO MATH_ERREXCEPT FP_NAN FP_INFINITE FP_ZER
 FP_NORMAL FP_FAST_FMA FP_FAST_FMAF FP_FAST_FMAL FP_ILOGB0 FP_ILOGBNAN FLT_RADIX FLT_ROUNDS
 FLT_EVAL_METHOD DECIMAL_DIG fpclassify isnormal isgreater isgreaterequal isless islessequal
 islessgreater isunordered
-isfinite isnan isinf signbit lesser_of greater_of whole_power whole_number fabs fmod pow ldexp frexp
+isfinite isnan isinf signbit lesser_of greater_of segment_of whole_power whole_number fabs fmod pow ldexp frexp
 modf ceil round trunc rint cosh sinh tanh acosh asinh atanh cbrt log10 log2 log1p exp2 expm1 erf
 erfc gamma lgamma tgamma fmin fmax fdim fma j0 j1 jn y0 y1 yn index time signal div abs linux unix
 """.split()  # noqa: SIM905
@@ -244,6 +244,10 @@ class C:
             )
             listed = ", ".join(text for text, _ in elements)
             return f"((const double[]){{{listed}}})[(int)({place})]", ATOM
+        if op == "segment":
+            (x, _), *knots = (as_double(*pair) for pair in zip(node.args, operands, strict=True))
+            listed = ", ".join(text for text, _ in knots)
+            return f"segment_of({x}, (const double[]){{{listed}}}, {len(knots)})", ATOM
         if op == "not":
             return f"!{grouped(operands[0], level)}", level
         if op == "neg":

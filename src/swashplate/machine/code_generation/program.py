@@ -8,6 +8,7 @@ by side.
 from __future__ import annotations
 
 import math
+from bisect import bisect_right
 from collections.abc import Callable, Collection, Mapping, Sequence
 from operator import add, eq, ge, gt, le, lt, mul, ne, neg, sub
 from types import MappingProxyType
@@ -138,6 +139,9 @@ def _done(step: Step, operands: list[Any]) -> Any:
             return operands[1] if operands[0] else operands[2]
         case "element":
             return operands[1 + int(operands[0])]
+        case "segment":
+            x, *knots = operands
+            return float(max(bisect_right(knots, x, hi=len(knots) - 1) - 1, 0))
         case "past":
             newest, age = operands
             return newest.ago(age) if isinstance(newest, Line) else newest
@@ -165,6 +169,9 @@ def _done_over(step: Step, operands: list[Any]) -> Any:
         case "element":
             place, *elements = np.broadcast_arrays(*operands)
             return np.take_along_axis(np.array(elements), place[None].astype(int), 0)[0]
+        case "segment":
+            x, *knots = operands
+            return np.sum([x >= knot for knot in knots[1:-1]], axis=0, dtype=np.float64)
         case "**" if step.value < 0:
             return np.divide(1.0, power(operands[0], -step.value))
         case "**":

@@ -104,7 +104,7 @@ class Slopes:
         """Operands that a value follows continuously: no decision, and nothing in whole numbers."""
         if node in self._stands_for:
             return (self._stands_for[node],)
-        if node.kind != "float" or node.op in ("number", "name"):
+        if node.kind != "float" or node.op in ("number", "name", "segment"):
             return ()
         if node.op == "ruled":
             rule: DerivativeRule = node.value

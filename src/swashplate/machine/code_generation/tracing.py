@@ -533,21 +533,10 @@ class Trace:
         return self._between(x, *ends)
 
     def _looked_up(self, x: Node, knots: Sequence[Node], values: Sequence[Node]) -> Node:
-        """The same for a long table: the segment is found by bisection."""
+        """The same for a long table: its segment is searched, and looked up."""
         make = self.make
-        place: Node = ZERO
-        last = len(knots) - 2
-        step = 1 << (last.bit_length() - 1)
-        while step:
-            further = make("+", place, graph.number(float(step)))
-            at = make("min", further, graph.number(float(last)))
-            inside = graph.both(
-                make("<=", further, graph.number(float(last))),
-                make(">=", x, make("element", at, *knots)),
-            )
-            place = choose(inside, further, place)
-            step //= 2
-        self.label(self.noted(place), "segment")
+        place = make("segment", x, *knots)
+        self.label(place, "segment")
         following = make("+", place, ONE)
         ends = [make("element", at, *table) for table in (knots, values) for at in (place, following)]
         return self._between(x, *ends)

@@ -70,7 +70,7 @@ class March:
     """The text of a march under way.
 
     `names` are those that are read beside what parts read; `known` is what does not change, if that
-    was computed before.
+    was computed before; `first` is the first sample.
 
     Attributes
     ----------
@@ -86,8 +86,9 @@ class March:
         code: Code,
         names: Collection[str] = (),
         known: Mapping[Node, str] | None = None,
+        first: str = "%first",
     ) -> None:
-        self.sample_code, self.code = sample_code, code
+        self.sample_code, self.code, self._first = sample_code, code, first
         self._lanes, self._names = code.wide or 1, {*names}
         self.known = known_ahead(sample_code, code, names) if known is None else {**known}
         self._records = {
@@ -103,6 +104,12 @@ class March:
             node: code.variable(code.load("%states", place * self._lanes))
             for node, place, _ in self._carried()
         }
+        self._passed = {
+            tap: code.variable(self._at_first(tap))
+            for tap in sample_code.late
+            if tap.tap.late == 1 and tap.tap.hold == "none" and not tap.tap.delay
+        }
+        """What one sample passes on to the next, of signals that come a sample late."""
         self._worst = code.variable(code.constant(float("inf")))
         self._total = code.variable(code.constant(0.0))
 
@@ -152,24 +159,34 @@ class March:
                 self._keep(tap, n, sources)
         for tap in part.taps:
             for age, name in enumerate(part.tap_samples(tap)):
-                if name in read:
+                if name in read and tap in self._passed:
+                    known[graph.name(name)] = code.load(self._passed[tap])
+                elif name in read:
                     places = [self._past(tap, lane, str(age), n) for lane in range(self._lanes)]
                     known[graph.name(name)] = code.joined(places)
                     if tap.tap.longest:
                         code.lines[graph.name(name)] = self._line(tap, n)
         for name in part.part_model.input_types:
             signal = part.part_model.tap(name).signal
-            if signal in sample_code.signals and f"x_{signal}" in read:
+            node = graph.name(f"x_{signal}")
+            if signal in sample_code.signals and node.value in read and node not in sources:
                 now = code.load(self._records[signal], n, "double")
-                known[graph.name(f"x_{signal}")] = code.in_all_lanes(now)
+                known[node] = code.in_all_lanes(now)
         return known
 
     def _keep(self, tap: TapOf, n: str, known: Mapping[Node, str]) -> None:
         """Keep a signal between parts, which a tap reads later, in its line."""
         part = self.sample_code.parts[tap.part]
         (text,) = self.code.floats([part.tapped(tap)], dict(known))
+        if tap in self._passed:
+            self.code.store(text, self._passed[tap])
         place = self.code.put(f"mul i64 {n}, {self._lanes}")
         self.code.store(text, self._between[tap.between], place)
+
+    def _at_first(self, tap: TapOf) -> str:
+        """What a tap reads at the first sample."""
+        places = [self._past(tap, lane, "0", self._first) for lane in range(self._lanes)]
+        return self.code.joined(places)
 
     def _line(self, tap: TapOf, n: str) -> Callable[[str, int], str]:
         """What reads a tap's signal at any age."""
@@ -343,7 +360,7 @@ def step_texts(model: Model, form: CodeForm, stored: Sequence[SignalId]) -> tupl
             fraction = graph.name(part.delay_fraction(tap))
             known[fraction] = code.load("%delay_fraction", tap.number)
     known |= {node: code.load("%constants", place) for place, node in enumerate(constants)}
-    march = March(sample_code, code, known=known)
+    march = March(sample_code, code, known=known, first=first)
     known = march.sample(first)
     for place, signal in enumerate(stored):
         code.store(march.observed(signal, known), "%flat", place)

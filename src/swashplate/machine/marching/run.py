@@ -407,19 +407,18 @@ class Machine:
         check_start(start)
         self.check_inputs(first)
         late = self._before()
-        for _ in range(MOST_PASSES if start == "steady" else 1):
+        if start == "rest":
+            return self._pass(first, h, start, states_given, late)
+        for _ in range(MOST_PASSES):
             initial = self._pass(first, h, start, states_given, late)
             settled = self._late(initial)
             if all(isclose(settled[at], late[at], rel_tol=1e-14) for at in late):
                 return initial
-            if start == "steady":
-                late = settled
-        if start == "steady":
-            raise DomainError(
-                f"{self.name}: its parts act back on each other, and do not settle under these "
-                "inputs; start at rest."
-            )
-        return initial
+            late = settled
+        raise DomainError(
+            f"{self.name}: its parts act back on each other, and do not settle under these "
+            "inputs; start at rest."
+        )
 
     def _before(self) -> dict[tuple[int, str], float]:
         """What each signal that comes late was before the record, by part and input."""
@@ -464,6 +463,7 @@ class Machine:
                 "given": numbers.given,
                 "h": h,
             }
+            needed, gives = self.model.at_rest[index]
             for name in part.input_types:
                 tap = part.tap(name)
                 link = self.model.link_of(index, name)
@@ -471,7 +471,9 @@ class Machine:
                     value = late[index, name]
                     between[tap.signal] = value
                 elif link is not None:
-                    value = linked(link, states, arguments_of_parts, self.model.replacements)
+                    value = 0.0
+                    if start == "steady" or name in needed:
+                        value = linked(link, states, arguments_of_parts, self.model.replacements)
                     if name in part.taps:
                         rest = float(value_at(numbers.p, tap.before)) if tap.before else 0.0
                         value = between[tap.signal] = value if start == "steady" else rest
@@ -487,7 +489,7 @@ class Machine:
             else:
                 arguments["state"] = states_given[index]
             states.append(arguments["state"])
-            if part.sample is not None:
+            if part.sample is not None and (start == "steady" or gives):
                 try:
                     arguments["signals"] = called(part, part.sample, arguments)
                 except NO_NUMBER:
