@@ -37,8 +37,10 @@ from swashplate.crane.motion import Body
 from swashplate.crane.rope import Hanging, swing_of, too_fast_sentence
 from swashplate.drive import Drive
 from swashplate.errors import DomainError, InputError
+from swashplate.machine import Machine
 from swashplate.machine.marching import (
     CompiledStep,
+    SignalId,
     StepContext,
     bound_step,
     stored_of,
@@ -135,20 +137,13 @@ class CraneStepper:
     def __init__(self, crane: Crane, **options: Unpack[RunOptions]) -> None:
         keywords: dict[str, Any] = dict(options)
         check_names("A crane's run has no", keywords, RunOptions.__annotations__, "it has")
-        control = keywords.pop("control", None)
-        settings, controller, sensors = stages_of(control)
-        brake = bool(keywords.pop("brake", True))
-        numbers, fixed = _fixed(crane, settings, **keywords)
-        if fixed.actuation == "direct" and control is not None:
-            raise InputError("With direct actuation the voltages are given: leave control out.")
+        try:
+            prepared = _prepared(crane, tuple(keywords.items()))
+        except TypeError:  # a list, or another option without a hash
+            prepared = _prepared.__wrapped__(crane, tuple(keywords.items()))
         self._crane = crane
-        self.fixed = fixed
-        self._direct = fixed.actuation == "direct"
-        loop = Loop(settings, controller, fixed.actuation, fixed.loaded, brake)
-        self._machine = closed_loop(crane, numbers, loop)
-        self._outputs = stored_of(self._machine.model, _outputs(fixed, loop))
-        self._given = len(GIVES) if controller is not None else 0
-        self._seed = 0 if sensors is None else sensors.seed
+        self.fixed, self._machine, self._outputs, self._given, self._seed = prepared
+        self._direct = self.fixed.actuation == "direct"
         self._stepped: _Stepped | None = None
         self._samples = 0
 
@@ -303,6 +298,39 @@ class CraneStepper:
             "luff less, or start elsewhere",
         }
         return DomainError(f"{crane.name}: at {time:.2f} s {reasons[reason]}.")
+
+
+class _Prepared(NamedTuple):
+    """What runs of a crane with the same options share."""
+
+    fixed: Fixed
+    machine: Machine
+    outputs: tuple[SignalId, ...]
+    given: int
+    """How many of them are a user-defined controller's."""
+    seed: int
+    """Of the sensors."""
+
+
+@lru_cache(maxsize=32)
+def _prepared(crane: Crane, options: tuple[tuple[str, Any], ...]) -> _Prepared:
+    """Check the options of a run, `RunOptions`, and join its machine."""
+    keywords = dict(options)
+    control = keywords.pop("control", None)
+    settings, controller, sensors = stages_of(control)
+    brake = bool(keywords.pop("brake", True))
+    numbers, fixed = _fixed(crane, settings, **keywords)
+    if fixed.actuation == "direct" and control is not None:
+        raise InputError("With direct actuation the voltages are given: leave control out.")
+    loop = Loop(settings, controller, fixed.actuation, fixed.loaded, brake)
+    machine = closed_loop(crane, numbers, loop)
+    return _Prepared(
+        fixed=fixed,
+        machine=machine,
+        outputs=stored_of(machine.model, _outputs(fixed, loop)),
+        given=len(GIVES) if controller is not None else 0,
+        seed=0 if sensors is None else sensors.seed,
+    )
 
 
 def _measures(samples: Any, rate: float) -> Any:
