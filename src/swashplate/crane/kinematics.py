@@ -115,9 +115,17 @@ def rotation(roll: float, pitch: float, yaw: float) -> Rotation:
     Rotation
         The ship's axes in the inertial frame.
     """
-    cf, sf = cos(roll), sin(roll)
-    ct, st = cos(pitch), sin(pitch)
-    cy, sy = cos(yaw), sin(yaw)
+    return axes_of((cos(roll), sin(roll)), (cos(pitch), sin(pitch)), (cos(yaw), sin(yaw)))
+
+
+@equation
+def axes_of(
+    roll: tuple[float, float], pitch: tuple[float, float], yaw: tuple[float, float]
+) -> Rotation:
+    """R of cosine and sine of each angle of the ship."""
+    cf, sf = roll
+    ct, st = pitch
+    cy, sy = yaw
     return Rotation(
         Vector(cy * ct, sy * ct, -st),
         Vector(cy * st * sf - sy * cf, sy * st * sf + cy * cf, ct * sf),

@@ -13,15 +13,16 @@ of its two quadratics.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import atan2, cos, inf, isfinite, pi, sin, sqrt
+from math import inf, isfinite, pi, sqrt
 from typing import Annotated, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from swashplate.crane.kinematics import Vector, add_scaled, dot, norm, rotation, to_ship, vector_of
+from swashplate.crane.kinematics import Vector, add_scaled, axes_of, dot, norm, vector_of
 from swashplate.errors import InputError
-from swashplate.machine import Definition, equation, kernel
+from swashplate.machine import Definition, Machine, Model, equation
+from swashplate.machine.marching import stored_of, unchecked_march
 from swashplate.results import Result
 
 Array = NDArray[np.float64]
@@ -372,23 +373,42 @@ def set_off(
 # --- path of a load -------------------------------------------------------------------------------
 
 
-@kernel
-def _fill_motion(tip: Array, length: Array, start: Hung, s: Hanging, h: float, out: Array) -> int:
-    """Fill load, hook and pull after the first sample; the sample that failed, or 0."""
-    now = start
-    tip_now = Vector(tip[0, 0], tip[0, 1], tip[0, 2])
-    for n in range(tip.shape[0]):
-        if n > 0:
-            next_tip = Vector(tip[n, 0], tip[n, 1], tip[n, 2])
-            square = 0.5 * h * h if n == 1 else h * h
-            now = rope_step(now, tip_now, next_tip, length[n], s, h, square)
-            tip_now = next_tip
-            if now.pull < 0.0:
-                return n
-        out[n, 0], out[n, 1], out[n, 2] = now.load.x, now.load.y, now.load.z
-        out[n, 3], out[n, 4], out[n, 5] = now.hook.x, now.hook.y, now.hook.z
-        out[n, 6] = now.pull
-    return 0
+class Path(NamedTuple):
+    """Load and rope, and where they are at the first sample."""
+
+    hanging: Hanging
+    first: Hung
+
+
+class Led(NamedTuple):
+    """Load and upper end of the rope at the sample before."""
+
+    samples: float = 0.0
+    """Samples so far, 2 if they are more: the first two are not like the others."""
+    hung: Hung = Hung(*(Vector(0.0, 0.0, 0.0),) * 4, 0.0, 0.0)
+    tip: Vector = Vector(0.0, 0.0, 0.0)
+
+
+@equation
+def led_now(
+    state: Led, tip_x: float, tip_y: float, tip_z: float, rope: float, p: Path, h: float
+) -> Hung:
+    """Load and hook at a sample; the first step is half a step from a given velocity."""
+    hung = p.first
+    if state.samples > 0.5:
+        square = 0.5 * h * h if state.samples < 1.5 else h * h
+        tip = Vector(tip_x, tip_y, tip_z)
+        hung = rope_step(state.hung, state.tip, tip, rope, p.hanging, h, square)
+    return hung
+
+
+@equation
+def led_step(state: Led, signals: Hung, tip_x: float, tip_y: float, tip_z: float) -> Led:
+    """Keep a sample for the next one."""
+    return Led(min(state.samples + 1.0, 2.0), signals, Vector(tip_x, tip_y, tip_z))
+
+
+path = Model("path", parameters=Path, state=Led, step=led_step, sample=led_now)
 
 
 class LoadMotion(NamedTuple):
@@ -442,14 +462,14 @@ def load_motion(
         For paths that do not fit together, a damping ratio beyond its range, and if the tip moves
         by the order of the rope's length within a step.
     """
-    path = np.ascontiguousarray(tip, dtype=np.float64)
-    if path.ndim != 2 or path.shape[1] != 3 or len(path) < 2:
+    tips = np.ascontiguousarray(tip, dtype=np.float64)
+    if tips.ndim != 2 or tips.shape[1] != 3 or len(tips) < 2:
         raise InputError("The tip's path needs two or more rows of x, y and z.")
-    rope = np.ascontiguousarray(np.broadcast_to(np.asarray(length, dtype=np.float64), len(path)))
-    if not (np.isfinite(path).all() and np.isfinite(rope).all() and rope.min() > 0.0):
+    rope = np.ascontiguousarray(np.broadcast_to(np.asarray(length, dtype=np.float64), len(tips)))
+    if not (np.isfinite(tips).all() and np.isfinite(rope).all() and rope.min() > 0.0):
         raise InputError("Tip and rope must be finite everywhere, and the rope longer than 0 m.")
     # second-order difference of the first samples
-    slope = (4.0 * path[1] - 3.0 * path[0] - path[min(2, len(path) - 1)]) * rate / 2.0
+    slope = (4.0 * tips[1] - 3.0 * tips[0] - tips[min(2, len(tips) - 1)]) * rate / 2.0
     v = slope if velocity is None else np.asarray(velocity, dtype=np.float64)
     h = 1.0 / rate
     s = (suspension or Suspension()).hanging(
@@ -460,14 +480,14 @@ def load_motion(
         wind=wind,
         swing_damping=swing_damping,
     )
-    now = hanging_load(vector_of(path[0]), 0.0, 0.0, float(rope[0]), s)
+    now = hanging_load(vector_of(tips[0]), 0.0, 0.0, float(rope[0]), s)
     now = now._replace(
         previous_load=vector_of(np.array(now.load) - v * h),
         previous_hook=vector_of(np.array(now.hook) - v * h),
     )
     if start is not None:
         load = np.asarray(start, dtype=np.float64)
-        line = load - path[0]
+        line = load - tips[0]
         distance = float(np.linalg.norm(line))
         if not distance > s.sling:
             raise InputError(
@@ -484,13 +504,25 @@ def load_motion(
             pull=float(elastic_pull(stretch, stretch, float(rope[0]), s, h)),
             stretch=stretch,
         )
-    out = np.empty((len(path), 7))
-    failed = _fill_motion(path, rope, now, s, h, out)
-    if failed:
+    out = _led(Path(s, now), tips, rope, h)
+    failed = int(np.argmax(out[6] < 0.0))
+    if out[6, failed] < 0.0:
         raise InputError(too_fast_sentence(float(rope[failed]), failed / rate, rate))
     if not s.stiffness > 0.0:
-        out[0, 6] = out[1, 6]
-    return LoadMotion(out[:, :3], out[:, 6], out[:, 3:6] if s.sling > 0.0 else None)
+        out[6, 0] = out[6, 1]
+    return LoadMotion(out[:3].T, out[6], out[3:6].T if s.sling > 0.0 else None)
+
+
+def _led(numbers: Path, tips: Array, rope: Array, h: float) -> Array:
+    """(7, n) load, hook and pull of a load that is led along a path."""
+    machine = Machine(path, numbers)
+    inputs = {f"tip_{axis}": np.ascontiguousarray(tips[:, i]) for i, axis in enumerate("xyz")}
+    inputs["rope"] = rope
+    names = [f"{point}.{axis}" for point in ("load", "hook") for axis in "xyz"]
+    stored = stored_of(path, [*names, "pull"])
+    start = machine.start(dict.fromkeys(inputs, 0.0), h, "rest")
+    out, _ = unchecked_march(machine, inputs, h, start, stored)
+    return out
 
 
 def swing_of(load: Array, tip: Array) -> Array:
@@ -515,22 +547,20 @@ def rope_leads(line: Array, slew: Array, ship: Array) -> Array:
     -------
     (n, 2) array
     """
-    angles = np.empty((len(line), 2))
-    _leads(np.ascontiguousarray(line), np.ascontiguousarray(slew), ship, angles)
-    return angles
+    c, s = np.cos(slew), np.sin(slew)
+    x, y, z = _along_ship(line, ship)
+    outwards = np.arctan2(x * c - y * s, -z)
+    return np.stack([outwards, np.arctan2(-x * s - y * c, -z)], axis=1)
 
 
-@kernel
-def _leads(line: Array, slew: Array, ship: Array, out: Array) -> None:
-    """Fill the angles outwards and to starboard."""
-    r = rotation(0.0, 0.0, 0.0)
-    for n in range(len(line)):
-        if ship.shape[1] > 1:
-            r = rotation(ship[n, 3], ship[n, 4], ship[n, 5])
-        d = to_ship(r, Vector(line[n, 0], line[n, 1], line[n, 2]))
-        c, s = cos(slew[n]), sin(slew[n])
-        out[n, 0] = atan2(d.x * c - d.y * s, -d.z)
-        out[n, 1] = atan2(-d.x * s - d.y * c, -d.z)
+def _along_ship(vectors: Array, ship: Array) -> Array:
+    """(3, n) components along the ship's axes of (n, 3) inertial vectors, as `to_ship`."""
+    if ship.shape[1] == 1:
+        return vectors.T
+    cosines, sines = np.cos(ship[:, 3:]).T, np.sin(ship[:, 3:]).T
+    roll, pitch, yaw = zip(cosines, sines, strict=True)
+    axes = axes_of(roll, pitch, yaw)
+    return np.stack([np.asarray(dot(axis, Vector(*vectors.T))) for axis in axes])
 
 
 def in_ship_axes(points: Array, ship: Array) -> Array:
@@ -549,23 +579,7 @@ def in_ship_axes(points: Array, ship: Array) -> Array:
     """
     if ship.shape[1] == 1:
         return points
-    coordinates = np.empty_like(points)
-    _in_ship_axes(np.ascontiguousarray(points), np.ascontiguousarray(ship), coordinates)
-    return coordinates
-
-
-@kernel
-def _in_ship_axes(points: Array, ship: Array, out: Array) -> None:
-    """Fill the coordinates along the ship's axes."""
-    for n in range(len(points)):
-        r = rotation(ship[n, 3], ship[n, 4], ship[n, 5])
-        from_origin = Vector(
-            points[n, 0] - ship[n, 0], points[n, 1] - ship[n, 1], points[n, 2] - ship[n, 2]
-        )
-        along = to_ship(r, from_origin)
-        out[n, 0] = along.x
-        out[n, 1] = along.y
-        out[n, 2] = along.z
+    return _along_ship(points - ship[:, :3], ship).T
 
 
 def too_fast_sentence(length: float, time: float, rate: float) -> str:

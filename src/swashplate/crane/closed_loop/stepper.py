@@ -318,6 +318,8 @@ def _prepared(crane: Crane, options: tuple[tuple[str, Any], ...]) -> _Prepared:
     keywords = dict(options)
     control = keywords.pop("control", None)
     settings, controller, sensors = stages_of(control)
+    if not settings.path:  # nothing looks through the sensors
+        settings = settings._replace(sensing=None)
     brake = bool(keywords.pop("brake", True))
     numbers, fixed = _fixed(crane, settings, **keywords)
     if fixed.actuation == "direct" and control is not None:

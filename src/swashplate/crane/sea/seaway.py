@@ -18,7 +18,6 @@ from swashplate.crane.rope import GRAVITY
 from swashplate.crane.sea.transfer_functions import CRANE_SHIP, MOTIONS, Hull, TransferFunctions
 from swashplate.errors import InputError
 from swashplate.logs import Series, TextOptions, read_series
-from swashplate.machine import kernel
 from swashplate.results import Result
 
 Array = NDArray[np.float64]
@@ -399,8 +398,7 @@ class Seaway(Result):
             )
         points = self._points(intervals + 1)
         points[:, :6] += self.lean
-        motion = np.empty((intervals * inner + 1, 6))
-        _join(points, _basis(inner), motion)
+        motion = _joined(points, _basis(inner))
         return motion[:count]
 
     def _points(self, count: int) -> Array:
@@ -598,19 +596,13 @@ def _basis(inner: int) -> Array:
     )
 
 
-@kernel
-def _join(points: Array, basis: Array, out: Array) -> None:
-    """Fill motions between points on the coarse grid, rows of values, slopes and curvatures."""
-    inner = basis.shape[0]
-    motions = out.shape[1]
-    for n in range(points.shape[0] - 1):
-        before = points[n]
-        after = points[n + 1]
-        for i in range(inner):
-            for q in range(motions):
-                value = 0.0
-                for k in range(3):
-                    value += basis[i, k] * before[k * motions + q]
-                    value += basis[i, 3 + k] * after[k * motions + q]
-                out[n * inner + i, q] = value
-    out[out.shape[0] - 1] = points[points.shape[0] - 1, :motions]
+def _joined(points: Array, basis: Array) -> Array:
+    """(n, 6) motions between points on the coarse grid, rows of values, slopes and curvatures."""
+    inner = len(basis)
+    intervals, motions = len(points) - 1, 6
+    between = np.zeros((intervals, inner, motions))
+    for k in range(3):
+        part = slice(k * motions, (k + 1) * motions)
+        between += basis[:, k, None] * points[:-1, None, part]
+        between += basis[:, 3 + k, None] * points[1:, None, part]
+    return np.concatenate([between.reshape(-1, motions), points[-1:, :motions]])
