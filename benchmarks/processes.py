@@ -86,7 +86,7 @@ def _answers(command: Sequence[str], folder: str) -> bool:
 def first_use_rows() -> Iterator[Row]:
     """A first simulation in a new process, without and with a cache of compiled code."""
     with TemporaryDirectory() as folder:
-        environment = {"NUMBA_CACHE_DIR": folder}
+        environment = {"SWASHPLATE_CACHE_DIR": folder}
         for what in ("empty cache: compiled", "cached"):
             found = work("first", environment=environment)
             yield Row(f"first simulation of a process, {what}", duration(found["first"]))

@@ -72,7 +72,7 @@ def notebook(tmp_path_factory: pytest.TempPathFactory) -> dict[str, list[Any]]:
     book = nbformat.v4.new_notebook(cells=cells)
     client = NotebookClient(book, timeout=400, kernel_name="python3", resources={})
     with pytest.MonkeyPatch.context() as patch:
-        patch.setenv("NUMBA_CACHE_DIR", str(folder / "cache"))
+        patch.setenv("SWASHPLATE_CACHE_DIR", str(folder / "cache"))
         patch.setenv("IPYTHONDIR", str(folder / "ipython"))
         client.execute(cwd=str(folder))
     return {name: cell.outputs for name, cell in zip(CELLS, book.cells, strict=True)}

@@ -128,7 +128,7 @@ swashplate.Drive.preset("hoist").simulate(swashplate.maneuvers.parse("step:9"))
 @pytest.mark.slow  # compiles a drive in a process of its own
 def test_compiling_is_said_once_a_machine_and_only_to_who_asks(tmp_path: Path) -> None:
     def errors(*words: str, cache: str) -> str:
-        place = os.environ | {"NUMBA_CACHE_DIR": str(tmp_path / cache)}
+        place = os.environ | {"SWASHPLATE_CACHE_DIR": str(tmp_path / cache)}
         command = [sys.executable, "-c", SCRIPT, *words]
         done = subprocess.run(command, env=place, capture_output=True, text=True, check=True)
         assert not done.stdout

@@ -5,9 +5,6 @@ import logging
 import lazy_loader
 
 from swashplate.__about__ import __version__ as __version__
-from swashplate.environment import obey
-
-obey()
 
 # a library's logger prints nothing until the program that uses it says so
 logging.getLogger("swashplate").addHandler(logging.NullHandler())

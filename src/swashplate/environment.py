@@ -1,26 +1,23 @@
-"""What environment variables say of compiling: where code is kept, for which processor, whether.
-
-Numba, which compiles kernels of the crane and of users, is told the same.
-"""
+"""What environment variables say of compiling: where code is kept, for which processor, whether."""
 
 from __future__ import annotations
 
 import os
-import sys
 
 CACHE_DIR, CPU, COMPILE = "SWASHPLATE_CACHE_DIR", "SWASHPLATE_CPU", "SWASHPLATE_COMPILE"
 """Folder of compiled code; LLVM's name of the processor that is compiled for; 0: nothing is."""
 
 
-def obey() -> None:
-    """Hand the variables on, before anything is compiled."""
-    told = {}
-    if folder := os.environ.get(CACHE_DIR):
-        told["NUMBA_CACHE_DIR"] = folder
-    if processor := os.environ.get(CPU):
-        told |= {"NUMBA_CPU_NAME": processor, "NUMBA_CPU_FEATURES": ""}
-    if os.environ.get(COMPILE) == "0":
-        told["NUMBA_DISABLE_JIT"] = "1"
-    os.environ.update(told)
-    if told and "numba" in sys.modules:  # imported before, with settings of its own
-        sys.modules["numba"].config.reload_config()
+def told_folder() -> str:
+    """Folder for all that is kept, if one is said; else empty."""
+    return os.environ.get(CACHE_DIR, "")
+
+
+def told_processor() -> str:
+    """Processor that is compiled for, if one is said; else empty: this one."""
+    return os.environ.get(CPU, "")
+
+
+def compiles() -> bool:
+    """Whether anything is compiled."""
+    return os.environ.get(COMPILE, "") != "0"

@@ -125,7 +125,7 @@ class Processes:
             for worker in set(active_children()) - others:
                 worker.kill()
 
-        # spawned, not forked: a fork copies locks of NumPy's and Numba's threads in any state
+        # spawned, not forked: a fork copies locks of NumPy's threads in any state
         with (
             undone(end_workers),
             ProcessPoolExecutor(

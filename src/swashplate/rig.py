@@ -670,7 +670,7 @@ def _contents(tests: VirtualTests) -> tuple[str, str]:
     truth = {"virtual": True, "axis": tests.axis, "drive": DRIVE_FILE}
     truth |= {key: getattr(tests, key) for key in ("severity", "seed", "counts_per_turn")}
     truth |= {"runs": list(tests.runs), "instruments": asdict(instruments)}
-    versions = {package: version(package) for package in ("numpy", "numba")}
+    versions = {package: version(package) for package in ("numpy", "llvmlite")}
     truth["versions"] = {"swashplate": __version__, "python": python_version(), **versions}
     return dumps(content | {"axes": {tests.axis: axis}, "runs": runs}), dumps(truth)
 

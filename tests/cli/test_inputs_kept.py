@@ -86,7 +86,7 @@ def test_a_cache_that_others_can_write_to_is_not_read(tmp_path: Path) -> None:
     cache.chmod(0o777)
     done = subprocess.run(
         [sys.executable, "-m", "swashplate", "doctor"],
-        env={**os.environ, "NUMBA_CACHE_DIR": str(cache), "PYTHONWARNINGS": "default"},
+        env={**os.environ, "SWASHPLATE_CACHE_DIR": str(cache), "PYTHONWARNINGS": "default"},
         capture_output=True,
         text=True,
         check=True,

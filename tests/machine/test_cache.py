@@ -86,7 +86,7 @@ def python(*words: str, **environment: str) -> subprocess.CompletedProcess[str]:
         capture_output=True,
         text=True,
         check=True,
-        env={**os.environ, "NUMBA_DISABLE_JIT": "0", **environment},
+        env={**os.environ, "SWASHPLATE_COMPILE": "1", **environment},
     )
 
 
@@ -94,7 +94,7 @@ def run(folder: Path, text: str = EQUATIONS) -> dict[str, Any]:
     """Values and cache hits of the kernels in a process of their own."""
     (folder / "machine.py").write_text(text)
     os.utime(folder / "machine.py", (1e9, 1e9))  # the stamp that Numba itself would look at
-    more = {"NUMBA_CACHE_DIR": str(folder / "cache"), "PYTHONDONTWRITEBYTECODE": "1"}
+    more = {"SWASHPLATE_CACHE_DIR": str(folder / "cache"), "PYTHONDONTWRITEBYTECODE": "1"}
     return json.loads(python("-c", RUN, str(folder), **more).stdout)
 
 
@@ -141,7 +141,7 @@ BYTEARRAY = b"\x80\x05\x96" + (1 << 20).to_bytes(8, "little") + b"x" * 64
 @pytest.mark.slow
 def test_a_garbled_index_is_not_unpickled(tmp_path: Path) -> None:
     run(tmp_path)
-    environment = {"NUMBA_CACHE_DIR": str(tmp_path / "cache")}
+    environment = {"SWASHPLATE_CACHE_DIR": str(tmp_path / "cache")}
     for garbled in (BYTEARRAY, b"cos\nsystem\n(S'echo run >&2'\ntR.", bytes(range(256))):
         for path in (tmp_path / "cache").rglob("*.nbi"):
             path.write_bytes(garbled)
@@ -162,7 +162,7 @@ def test_a_folder_in_the_place_of_machine_code(tmp_path: Path) -> None:
         "-c",
         RUN,
         str(tmp_path),
-        NUMBA_CACHE_DIR=str(tmp_path / "cache"),
+        SWASHPLATE_CACHE_DIR=str(tmp_path / "cache"),
         PYTHONWARNINGS="default",
     )
     assert json.loads(done.stdout)["march"] == 46.0
@@ -221,7 +221,7 @@ def files(folder: Path, *names: str, age: float = 0.0, size: int = 10) -> None:
 @pytest.mark.slow
 def test_the_folder_is_tidied_once_a_day_and_use_counts(tmp_path: Path) -> None:
     kept = tmp_path / "cache" / "swashplate_generated"
-    environment = {"NUMBA_CACHE_DIR": str(tmp_path / "cache")}
+    environment = {"SWASHPLATE_CACHE_DIR": str(tmp_path / "cache")}
     march(tmp_path, **environment)
     files(kept, "old_1.pickle", age=1000.0 * DAY)
     files(tmp_path / "cache" / "swashplate_generated_1a", "old_1.march-3.nbi", age=1000.0 * DAY)
@@ -270,7 +270,7 @@ print([loop(4) for loop in loops], sum(sum(l.stats.cache_hits.values()) for l in
 def test_kernels_around_compiled_functions_are_kept_apart(tmp_path: Path) -> None:
     script = tmp_path / "made_twice.py"
     script.write_text(MADE_TWICE, "utf-8")
-    cache = {"NUMBA_CACHE_DIR": str(tmp_path / "cache")}
+    cache = {"SWASHPLATE_CACHE_DIR": str(tmp_path / "cache")}
     said = [python(str(script), **cache).stdout.split("]") for _ in range(2)]
     assert [each[0] for each in said] == ["[12.0, 18.0"] * 2
     assert [int(each[1]) for each in said] == [0, 2]

@@ -99,8 +99,8 @@ def run(folder: Path, text: str) -> tuple[float, float, int]:
         check=True,
         env={
             **os.environ,
-            "NUMBA_DISABLE_JIT": "0",
-            "NUMBA_CACHE_DIR": str(folder / "cache"),
+            "SWASHPLATE_COMPILE": "1",
+            "SWASHPLATE_CACHE_DIR": str(folder / "cache"),
             # Python knows byte code by second and size, and this file changes faster than that
             "PYTHONDONTWRITEBYTECODE": "1",
         },
@@ -292,7 +292,7 @@ def test_constants_and_tables_of_modules_are_edited(tmp_path: Path) -> None:
     def end() -> float:
         for name, text in texts.items():
             (tmp_path / f"{name}.py").write_text(text, "utf-8")
-        environment = {"NUMBA_DISABLE_JIT": "0", "NUMBA_CACHE_DIR": str(tmp_path / "cache")}
+        environment = {"SWASHPLATE_COMPILE": "1", "SWASHPLATE_CACHE_DIR": str(tmp_path / "cache")}
         environment["PYTHONDONTWRITEBYTECODE"] = "1"  # the files change within a second
         done = subprocess.run(
             [sys.executable, "-c", TABLES_RUN, str(tmp_path)],

@@ -60,7 +60,7 @@ END, SLOPE = 1.0 - 0.5**3, 3.0 * 0.5**2
 
 def start(folder: Path, **environment: str) -> subprocess.CompletedProcess[str]:
     (folder / "machine.py").write_text(MACHINE, "utf-8")
-    cache = {"NUMBA_DISABLE_JIT": "0", "NUMBA_CACHE_DIR": str(folder / "cache")}
+    cache = {"SWASHPLATE_COMPILE": "1", "SWASHPLATE_CACHE_DIR": str(folder / "cache")}
     return subprocess.run(
         [sys.executable, "-c", RUN, str(folder)],
         capture_output=True,
@@ -89,7 +89,7 @@ def test_a_second_process_compiles_nothing(warm: Path) -> None:
 
 
 def test_code_is_for_one_processor(warm: Path) -> None:
-    generic = {"NUMBA_CPU_NAME": "generic", "NUMBA_CPU_FEATURES": ""}
+    generic = {"SWASHPLATE_CPU": "generic"}
     assert compiled(warm, **generic) > 5
     assert compiled(warm, **generic) == 0
     assert compiled(warm) == 0
@@ -131,5 +131,5 @@ def test_a_folder_that_cannot_be_written(warm: Path) -> None:
 
 def test_a_file_in_the_place_of_the_folder(tmp_path: Path) -> None:
     (tmp_path / "file").write_text("")
-    nowhere = {"NUMBA_CACHE_DIR": str(tmp_path / "file"), "PYTHONWARNINGS": "default"}
+    nowhere = {"SWASHPLATE_CACHE_DIR": str(tmp_path / "file"), "PYTHONWARNINGS": "default"}
     assert compiled(tmp_path, **nowhere) > 5

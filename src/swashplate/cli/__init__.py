@@ -199,11 +199,6 @@ def _check_surroundings() -> None:
         raise InputError(
             f"SOURCE_DATE_EPOCH is '{epoch}', which is not a number of seconds since 1970"
         )
-    threads = os.environ.get("NUMBA_NUM_THREADS", "1")
-    if not threads.isdecimal() or int(threads) == 0:
-        raise InputError(
-            f"NUMBA_NUM_THREADS is '{threads}', which is not a number of threads; unset it"
-        )
     try:
         Path.cwd()
     except OSError:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import platform
 import sys
 from importlib import metadata
@@ -15,11 +14,11 @@ import typer
 from swashplate.__about__ import __version__
 from swashplate.cli.commands import command
 from swashplate.cli.terminal import note, say, show, spinner
-from swashplate.environment import COMPILE
+from swashplate.environment import COMPILE, compiles
 from swashplate.executors import available_cores
 from swashplate.tables import Column, Table
 
-LIBRARIES = ("numpy", "scipy", "numba", "polars", "pydantic", "matplotlib", "jinja2", "h5py")
+LIBRARIES = ("numpy", "scipy", "llvmlite", "polars", "pydantic", "matplotlib", "jinja2", "h5py")
 """Whose versions matter when a result or a figure differs."""
 EXTRAS = {
     "binaries": ("ziglang", "exports of user-defined equations for every platform"),
@@ -56,7 +55,7 @@ def doctor() -> None:
     table.add("Python", platform.python_version(), "")
     table.add("system", f"{platform.system()} {platform.machine()}", "")
     table.add("cores", str(available_cores()), "")
-    if os.environ.get("NUMBA_DISABLE_JIT", "0") != "0":  # or by `environment.obey`
+    if not compiles():
         table.add(
             COMPILE,
             "0",

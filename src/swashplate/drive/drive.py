@@ -20,10 +20,8 @@ from swashplate.errors import InputError
 from swashplate.machine import Equation, Machine, Replacement, Stepper
 from swashplate.machine.marching import (
     SOURCE_RATE,
-    CompiledStep,
     Interpolation,
     Start,
-    compiled_step,
 )
 from swashplate.maneuvers import Maneuver
 from swashplate.parameters import (
@@ -647,38 +645,6 @@ class Drive(Result, Machine, Mapping[str, Parameter]):
         """
         rate = in_si(rate, "Hz", "The rate")
         return drive_stepper(self.parameters, rate, interpolation, start, measured)
-
-    def compiled_step(
-        self,
-        outputs: Sequence[str] = ("shaft_speed",),
-        *,
-        inputs: Sequence[str] = ("voltage",),
-        rate: float = SOURCE_RATE,
-    ) -> CompiledStep:
-        """The drive's step for compiled kernels that close loops around it.
-
-        Parameters
-        ----------
-        outputs : sequence of str
-            Signals of the step, by their names in `Simulation`; ``"limits"`` are the pump's, a bit
-            each: dead zone, orifice, spool, swash stop, relief.
-        inputs : sequence of str
-            ``"voltage"``, and of ``"load_torque"``, ``"pump_speed"`` and ``"supply_pressure"`` what
-            the loop gives; for the others the parameters count.
-        rate : float
-            Steps a second, without steps between; 512 or more are the march's own. [Hz]
-
-        Returns
-        -------
-        CompiledStep
-            Its ``step(context)`` advances one sample inside a compiled kernel.
-
-        Raises
-        ------
-        InputError
-            For signals that a drive does not have, and a rate too low for the card's filter.
-        """
-        return compiled_step(self, inputs, outputs, in_si(rate, "Hz", "The rate"))
 
     def linearize(
         self,

@@ -21,14 +21,12 @@ from .code_generation.loops import past as past
 from .code_generation.loops import repeated as repeated
 from .code_generation.loops import root as root
 from .declaration import equation as equation
-from .declaration import inlined as inlined
 from .declaration import source as source
 from .declaration import with_replacements as with_replacements
 from .fields import Definition as Definition
 from .fields import Flag as Flag
 from .joining import join as join
 from .joining import late as late
-from .kernels import kernel as kernel
 from .linear.frequency_response import sweep as sweep
 from .linear.linearisation import linearize as linearize
 from .linear.settling import settle as settle

@@ -7,18 +7,19 @@ import os
 import sys
 import tempfile
 from functools import cache
-from glob import escape
 from pathlib import Path
 from stat import S_IWGRP, S_IWOTH
 from time import time
 from warnings import warn
 
+from swashplate.environment import told_folder
+
 UNCACHED = (
-    "swashplate's compiled kernels cannot be stored, so every session compiles them again; set "
+    "swashplate's compiled code cannot be stored, so that every session compiles again; set "
     "SWASHPLATE_CACHE_DIR to a writable folder."
 )
 OPEN = (
-    "swashplate's compiled kernels are not read from {folder}, as {why}: what it holds is run. "
+    "swashplate's compiled code are not read from {folder}, as {why}: what it holds is run. "
     "Remove it, or set SWASHPLATE_CACHE_DIR to a folder that only you can write to."
 )
 COMPILING = "Compiling equations, once on this machine"
@@ -78,11 +79,6 @@ def warn_exposed(folder: str, why: str) -> None:
 
 
 # --- what is generated ----------------------------------------------------------------------------
-
-
-def told_folder() -> str:
-    """Folder for all that is kept, if an environment variable says one; else empty."""
-    return os.environ.get("NUMBA_CACHE_DIR", "")
 
 
 def _user_cache() -> Path:
@@ -163,12 +159,9 @@ def _tidy(folder: Path) -> None:
         if mark.exists() and time() - mark.stat().st_mtime < DAY:
             return
         mark.touch()
-        # Numba keeps machine code in folders next to theirs
-        sibling_folders = folder.parent.glob(f"{escape(folder.name)}_*")
-        for swept in [folder, folder / "__pycache__", *sibling_folders]:
-            for path in [*swept.glob("*.*")]:
-                if time() - path.stat().st_mtime > UNUSED:
-                    path.unlink()
+        for path in [*folder.glob("*.*")]:
+            if time() - path.stat().st_mtime > UNUSED:
+                path.unlink()
         files = [(path.stat().st_mtime, path) for path in folder.glob("*.kept")]
         size = 0
         for _, path in sorted(files, reverse=True):

@@ -7,7 +7,6 @@ a file, decides whether machine code kept on disk still holds.
 import inspect
 import linecache
 import math
-import os
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 from hashlib import blake2b
 from itertools import chain, count
@@ -15,6 +14,7 @@ from types import CellType, CodeType, FunctionType, MappingProxyType, ModuleType
 from typing import Any, TypeVar, get_args
 from weakref import WeakKeyDictionary
 
+from swashplate.environment import compiles
 from swashplate.errors import EquationError
 from swashplate.machine.language import is_named_tuple, parsed, resolved
 
@@ -25,19 +25,18 @@ Replacements = Mapping[Any, tuple[Any, ...]]
 within it the next."""
 NO_REPLACEMENTS: Replacements = MappingProxyType({})
 
-JIT_OFF = os.environ.get("NUMBA_DISABLE_JIT", "0") not in ("", "0")
+JIT_OFF = not compiles()
 """Whether nothing is compiled: ``SWASHPLATE_COMPILE=0``."""
 RULES: WeakKeyDictionary[FunctionType, Any] = WeakKeyDictionary()
 """Equations that return the derivatives of others, see `declared`."""
 _NOTHING = object()
 
-compiled_functions: dict[Any, None] = {}
-"""Plain functions that were given to `inlined`, for when nothing is compiled."""
+_equations: dict[Any, None] = {}
 
 
-def inlined(function: F) -> F:
-    """Have kernels compile a function into themselves: strict arithmetic, no exceptions."""
-    compiled_functions[function] = None
+def known_equation(function: F) -> F:
+    """Let equations call a function; its text is not looked at."""
+    _equations[function] = None
     return function
 
 
@@ -56,7 +55,7 @@ def equation(function: F) -> F:
     Returns
     -------
     callable
-        The function itself. Models and kernels that use it compile it into themselves.
+        The function itself. Models that use it compile it into themselves.
 
     Raises
     ------
@@ -67,7 +66,7 @@ def equation(function: F) -> F:
     """
     if not str(getattr(function, "__module__", "")).startswith("swashplate."):
         parsed(function)  # the package's own are read when they are needed, and all by its tests
-    return inlined(function)
+    return known_equation(function)
 
 
 def source(function: Any) -> str:
@@ -192,17 +191,11 @@ def _is_constant(thing: Any) -> bool:
 
 def is_function(thing: Any) -> bool:
     """Whether something is a function that compiled code can call."""
-    return isinstance(thing, FunctionType) and thing in compiled_functions
+    return isinstance(thing, FunctionType) and thing in _equations
 
 
 def _reached(thing: Any) -> Any:
-    """What of something decides what code does that names it; nothing of most things.
-
-    Of a kernel, and of what Numba has compiled, its function.
-    """
-    function = getattr(thing, "py_func", None)
-    if isinstance(function, FunctionType):
-        return function
+    """What of something decides what code does that names it; nothing of most things."""
     known = is_function(thing) or is_named_tuple(thing) or _is_constant(thing)
     return thing if known or isinstance(thing, ModuleType) else _NOTHING
 
@@ -259,7 +252,6 @@ def closure(function: Any) -> dict[str, Any]:
     The function is the first entry. If two things have the same name, the second has its module's
     name in front.
     """
-    function = getattr(function, "py_func", function)
     members: dict[str, Any] = {function.__name__: function}
     visited = {function}
     pending = [function]

@@ -22,6 +22,7 @@ from swashplate.machine.model import (
     source_of,
 )
 
+
 class Late(NamedTuple):
     """A signal a sample later; see `late`."""
 

@@ -622,8 +622,8 @@ def _wrong(model: Model) -> Iterator[str]:
             path = getattr(tap, word)
             if path and path not in parameters:
                 what = {"delay": "delay", "longest": "longest delay"}.get(word, "value before")
-                choice = ", ".join(parameters)
-                yield f"{prefix}the {what} of '{name}' is '{path}', but the parameters are {choice}."
+                has = ", ".join(parameters)
+                yield f"{prefix}the {what} of '{name}' is '{path}', but the parameters are {has}."
     states = floats_of(model.state)
     for name in [path for paths in model.free_start.values() for path in paths]:
         if name not in states:

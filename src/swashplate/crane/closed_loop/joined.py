@@ -1,4 +1,4 @@
-"""A crane under control as one machine: what is seen, crew, control, drives, boom, rope and load."""
+"""A crane under control as one machine: view, crew, control, drives, boom, rope and load."""
 
 from __future__ import annotations
 
@@ -12,11 +12,19 @@ from swashplate.analysis.compensation import InverseMap
 from swashplate.crane import crew
 from swashplate.crane.axes import AXES, RATE
 from swashplate.crane.closed_loop import seeing, steering
-from swashplate.crane.control import GIVES, SEEN, Controller, Settings
+from swashplate.crane.control import Controller, Settings
 from swashplate.crane.crane import Crane
-from swashplate.crane.kinematics import Shafts, Vector, boom_at, rope_length, shaft_torques, tip_of
-from swashplate.crane.machines import SPEED, Brake
-from swashplate.crane.motion import Body, Ship
+from swashplate.crane.kinematics import (
+    Shafts,
+    Vector,
+    add_scaled,
+    boom_at,
+    rope_length,
+    shaft_torques,
+    tip_of,
+)
+from swashplate.crane.machines import SPEED
+from swashplate.crane.motion import Body, Brake, Ship
 from swashplate.crane.motion import body as body_model
 from swashplate.crane.motion import brake as brake_model
 from swashplate.crane.rope import GRAVITY, hanging_load
@@ -58,157 +66,161 @@ def closed_loop(crane: Crane, numbers: Body, loop: Loop) -> Machine:
     be left out, and the `NOISE` of sensors. Control sees the crane a sample late: its links close
     the loop.
     """
-    settings = loop.settings
-    members: dict[str, Machine] = {}
-    links: dict[str, Any] = {}
-
-    def add(name: str, model: Any, numbers: Any, **wires: Any) -> None:
-        members[name] = numbers if isinstance(numbers, Machine) else Machine(model, numbers)
-        links.update({f"{name}.{taken}": given for taken, given in wires.items()})
-
-    first = _first(numbers, loaded=loop.loaded)
-    drivable = {axis: _drivable(crane.inverse(axis)) for axis in AXES}
-    slew, luff = drivable["slew"], drivable["luff"]
-    add(
-        "view",
-        seeing.view,
-        first,
-        **{name: late(f"body.{name}", before) for name, before in seeing.BEFORE.items()},
-        **{motion: f"body.{motion}" for motion in Ship._fields},
-    )
-    references = {axis: f"stick.reference_{axis}" for axis in AXES}
+    parts = _Parts(crane, numbers, loop)
+    parts.add_view()
     if loop.actuation != "direct":
-        add("stick", steering.stick, steering.Drives(**drivable))
-    if settings.crew is not None:
-        seen = ("swing_x", "swing_y", "swing_z", "rope", "slew", "boom_cos", "boom_sin")
-        seen += ("shaft_slew", "shaft_luff", "roll", "pitch", "yaw")
-        command = {f"reference_{axis}": references[axis] for axis in ("slew", "luff")}
-        operator = settings.crew
-        add(
-            "eye",
-            crew.eye,
-            crew.Eye(operator, slew, luff, numbers.geometry),
-            **command,
-            **{name: f"view.{name}" for name in seen},
-        )
-        add(
-            "hand",
-            crew.hand,
-            crew.Hand(operator.delay, operator.lag, slew, luff, numbers.geometry),
-            **command,
-            wanted_across="eye.wanted_across",
-            wanted_along="eye.wanted_along",
-            boom_cos="view.boom_cos",
-            boom_sin="view.boom_sin",
-        )
-        references |= {axis: f"hand.reference_{axis}" for axis in ("slew", "luff")}
-    if settings.path:
-        _add_control(add, members, links, references, numbers, loop, first, slew, luff)
-        references |= {axis: f"follower.reference_{axis}" for axis in ("slew", "luff")}
-    for axis in AXES:
-        reference = {"reference": references[axis]}
-        match loop.actuation:
-            case "ideal":
-                add(axis, steering.ideal, drivable[axis], **reference)
-                continue
-            case "volts":
-                add(f"{axis}_command", steering.straight, drivable[axis], **reference)
-            case "inverse":
-                inverse = _inverse_machine(crane.inverse(axis))
-                add(f"{axis}_command", inverse.model, inverse, **reference)
-        if loop.actuation != "direct":
-            links[f"{axis}.voltage"] = f"{axis}_command.command"
-        members[axis] = getattr(crane, axis)
-        if loop.loaded:
-            links[f"{axis}.load_torque"] = f"view.torque_{axis}"
-    speeds = {axis: f"{axis}.{SPEED}" for axis in AXES}
-    if loop.brake and loop.actuation != "ideal":
-        inverse = _inverse_numbers(crane.inverse("hoist"))
-        given = "hoist.voltage" if loop.actuation == "direct" else "hoist_command.command"
-        edges = Brake(inverse.edge_down, inverse.edge_up)
-        add("brake", brake_model, edges, voltage=given, speed=speeds["hoist"])
-        speeds["hoist"] = "brake.braked_speed"
-    add("body", body_model, numbers, **{f"{axis}_speed": speeds[axis] for axis in AXES})
-    whole: Machine = join(crane.name, members, links=links)
+        parts.add("stick", Machine(steering.stick, steering.Drives(**parts.drivable)))
+    if loop.settings.crew is not None:
+        parts.add_crew(loop.settings.crew)
+    if loop.settings.path:
+        parts.add_control()
+    parts.add_drives()
+    whole: Machine = join(crane.name, parts.members, links=parts.links)
     return whole
 
 
-def _add_control(
-    add: Any,
-    members: dict[str, Machine],
-    links: dict[str, Any],
-    references: dict[str, str],
-    numbers: Body,
-    loop: Loop,
-    first: seeing.First,
-    slew: steering.Drivable,
-    luff: steering.Drivable,
-) -> None:
-    """Add path, sensors, offsets and the loop that follows them."""
-    settings = loop.settings
-    command = {f"reference_{axis}": references[axis] for axis in ("slew", "luff")}
-    longest = 2.0 * pi * sqrt(numbers.travel.longest / GRAVITY) + 4.0 / RATE
-    add("path", steering.path, steering.Path(numbers.geometry, numbers.home), **command)
-    add(
-        "shaper",
-        steering.shaper,
-        steering.Impulses(*settings.tip, first.tip.x, first.tip.y, longest),
-        ahead_x="path.ahead_x",
-        ahead_y="path.ahead_y",
-        rope="view.rope",
-    )
-    source = "view"
-    if settings.sensing is not None:
-        seen = {name: f"view.{name}" for name in seeing.Seen._fields}
-        add("sensors", seeing.sensors, settings.sensing, **seen)
-        read = {name: f"sensors.{name}" for name in seeing.Seen._fields}
-        add("measured", seeing.measured, settings.sensing, **read)
-        source = "measured"
-    moved = ("swing_x", "swing_y", "height", *Ship._fields)
-    tip = {"path_x": "shaper.path_x", "path_y": "shaper.path_y"}
-    add(
-        "feedback",
-        steering.feedback,
-        steering.Offsets(
+class _Parts:
+    """Members of a crane under control, and their links, in the order of the flow."""
+
+    def __init__(self, crane: Crane, numbers: Body, loop: Loop) -> None:
+        self.crane, self.numbers, self.loop = crane, numbers, loop
+        self.members: dict[str, Machine] = {}
+        self.links: dict[str, Any] = {}
+        self.drivable = {axis: _drivable(crane.inverse(axis)) for axis in AXES}
+        self.first = _first(numbers, loaded=loop.loaded)
+        self.references = {axis: f"stick.reference_{axis}" for axis in AXES}
+        """Reference speed of each shaft so far."""
+
+    def add(self, name: str, machine: Machine, **wires: Any) -> None:
+        """Add a member; `wires` are what its inputs take."""
+        self.members[name] = machine
+        self.links.update({f"{name}.{taken}": given for taken, given in wires.items()})
+
+    def add_view(self) -> None:
+        """Add what is known of the sample before."""
+        known = {name: late(f"body.{name}", before) for name, before in seeing.BEFORE.items()}
+        ship = {motion: f"body.{motion}" for motion in Ship._fields}
+        self.add("view", Machine(seeing.view, self.first), **known, **ship)
+
+    @property
+    def _command(self) -> dict[str, str]:
+        """Reference speeds of slew and luff so far."""
+        return {f"reference_{axis}": self.references[axis] for axis in ("slew", "luff")}
+
+    def add_crew(self, operator: crew.HumanOperator) -> None:
+        """Add eye and hand of a crew."""
+        g, slew, luff = self.numbers.geometry, self.drivable["slew"], self.drivable["luff"]
+        eye = Machine(crew.eye, crew.Eye(operator, slew, luff, g))
+        seen = [name for name in crew.EyeInputs._fields if not name.startswith("reference")]
+        self.add("eye", eye, **self._command, **{name: f"view.{name}" for name in seen})
+        hand = Machine(crew.hand, crew.Hand(operator.delay, operator.lag, slew, luff, g))
+        wanted = {name: f"eye.{name}" for name in ("wanted_across", "wanted_along")}
+        boom = {name: f"view.{name}" for name in ("boom_cos", "boom_sin")}
+        self.add("hand", hand, **self._command, **wanted, **boom)
+        self.references |= {axis: f"hand.reference_{axis}" for axis in ("slew", "luff")}
+
+    def add_control(self) -> None:
+        """Add path, shaper, sensors, offsets and the loop that follows them."""
+        settings, numbers, tip = self.loop.settings, self.numbers, self.first.tip
+        longest = 2.0 * pi * sqrt(numbers.travel.longest / GRAVITY) + 4.0 / RATE
+        path = Machine(steering.path, steering.Path(numbers.geometry, numbers.home))
+        self.add("path", path, **self._command)
+        impulses = steering.Impulses(*settings.tip, tip.x, tip.y, longest)
+        ahead = {name: f"path.{name}" for name in ("ahead_x", "ahead_y")}
+        self.add("shaper", Machine(steering.shaper, impulses), **ahead, rope="view.rope")
+        source = "view" if settings.sensing is None else self._add_sensors(settings.sensing)
+        shaped = {name: f"shaper.{name}" for name in ("path_x", "path_y")}
+        swing = add_scaled(self.first.hook, -1.0, tip)
+        offsets = steering.Offsets(
             feedback=settings.feedback,
             delay=settings.delay,
             compensates=float(settings.ship),
-            begin_x=first.hook.x - first.tip.x,
-            begin_y=first.hook.y - first.tip.y,
+            begin_x=swing.x,
+            begin_y=swing.y,
             longest=longest,
-        ),
-        **tip,
-        rope="view.rope",
-        **{name: f"{source}.{name}" for name in moved},
-    )
-    extra = dict[str, str]()
-    if loop.controller is not None:
-        controller = loop.controller
-        known = {name: f"{source}.{name}" for name in seeing.Seen._fields}
-        known |= {"reference_x": "shaper.path_x", "reference_y": "shaper.path_y"}
-        known |= {"boom": (elevation, f"{source}.boom_sin", f"{source}.boom_cos")}
-        members["controller"] = Machine(controller.model, controller.values)
-        links.update({f"controller.{name}": known[name] for name in controller.model.external})
-        extra = dict(zip(("extra_x", "extra_y"), (f"controller.{name}" for name in GIVES)))
-    seen = ("rope", "boom_cos", "boom_sin", "shaft_slew", "shaft_luff")
-    add(
-        "follower",
-        steering.follower,
-        steering.Following(
+        )
+        moved = ("swing_x", "swing_y", "height", *Ship._fields)
+        self.add(
+            "feedback",
+            Machine(steering.feedback, offsets),
+            **shaped,
+            rope="view.rope",
+            **{name: f"{source}.{name}" for name in moved},
+        )
+        following = steering.Following(
             geometry=numbers.geometry,
             home=numbers.home,
-            slew=slew,
-            luff=luff,
+            slew=self.drivable["slew"],
+            luff=self.drivable["luff"],
             gain=settings.gain,
             clip=settings.clip,
             share=settings.share,
-        ),
-        **tip,
-        offset_x="feedback.offset_x",
-        offset_y="feedback.offset_y",
-        **extra,
-        **{name: f"view.{name}" for name in seen},
-    )
+        )
+        posed = ("rope", "boom_cos", "boom_sin", "shaft_slew", "shaft_luff")
+        self.add(
+            "follower",
+            Machine(steering.follower, following),
+            **shaped,
+            **{name: f"feedback.{name}" for name in ("offset_x", "offset_y")},
+            **self._add_controller(source),
+            **{name: f"view.{name}" for name in posed},
+        )
+        self.references |= {axis: f"follower.reference_{axis}" for axis in ("slew", "luff")}
+
+    def _add_sensors(self, sensing: seeing.Sensing) -> str:
+        """Add sensors; the member from which control takes what it sees."""
+        for name, model, source in (
+            ("sensors", seeing.sensors, "view"),
+            ("measured", seeing.measured, "sensors"),
+        ):
+            seen = {each: f"{source}.{each}" for each in seeing.Seen._fields}
+            self.add(name, Machine(model, sensing), **seen)
+        return "measured"
+
+    def _add_controller(self, source: str) -> dict[str, str]:
+        """Add a user-defined controller; what the follower takes of it."""
+        controller = self.loop.controller
+        if controller is None:
+            return {}
+        known: dict[str, Any] = {name: f"{source}.{name}" for name in seeing.Seen._fields}
+        known |= {"reference_x": "shaper.path_x", "reference_y": "shaper.path_y"}
+        known["boom"] = (elevation, f"{source}.boom_sin", f"{source}.boom_cos")
+        wires = {name: known[name] for name in controller.model.external}
+        self.add("controller", Machine(controller.model, controller.values), **wires)
+        return {f"extra_{axis}": f"controller.tip_{axis}" for axis in "xy"}
+
+    def add_drives(self) -> None:
+        """Add what turns reference speeds into speeds, and the body that these move."""
+        for axis in AXES:
+            if self.loop.actuation == "ideal":
+                ideal = Machine(steering.ideal, self.drivable[axis])
+                self.add(axis, ideal, reference=self.references[axis])
+            else:
+                self._add_drive(axis)
+        speeds = {f"{axis}_speed": f"{axis}.{SPEED}" for axis in AXES}
+        if self.loop.brake and self.loop.actuation != "ideal":
+            inverse = _inverse_numbers(self.crane.inverse("hoist"))
+            brake = Machine(brake_model, Brake(inverse.edge_down, inverse.edge_up))
+            given = self.links.get("hoist.voltage", "hoist.voltage")
+            self.add("brake", brake, voltage=given, speed=speeds["hoist_speed"])
+            speeds["hoist_speed"] = "brake.braked_speed"
+        self.add("body", Machine(body_model, self.numbers), **speeds)
+
+    def _add_drive(self, axis: str) -> None:
+        """Add a drive with what commands it."""
+        command = f"{axis}_command"
+        wires = {"voltage": f"{command}.command"}
+        if self.loop.actuation == "direct":
+            wires = {}
+        elif self.loop.actuation == "volts":
+            straight = Machine(steering.straight, self.drivable[axis])
+            self.add(command, straight, reference=self.references[axis])
+        else:
+            inverse = _inverse_machine(self.crane.inverse(axis))
+            self.add(command, inverse, reference=self.references[axis])
+        if self.loop.loaded:
+            wires["load_torque"] = f"view.torque_{axis}"
+        self.add(axis, getattr(self.crane, axis), **wires)
 
 
 def _first(numbers: Body, *, loaded: bool) -> seeing.First:

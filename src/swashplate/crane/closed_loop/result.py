@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swashplate.crane.axes import AXES, RATE, check_names
-from swashplate.crane.closed_loop.stepper import Fixed
 from swashplate.crane.closed_loop.signals import ROWS, Signals
+from swashplate.crane.closed_loop.stepper import Fixed
 from swashplate.crane.crane import Crane
 from swashplate.crane.rope import GRAVITY, in_ship_axes, rope_leads, swing_of
 from swashplate.crane.sea.transfer_functions import MOTIONS

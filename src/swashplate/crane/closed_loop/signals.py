@@ -81,10 +81,8 @@ class Signals(Result):
         """(n, 3) the signals of a group: ``"speed"`` of hoist, slew and luff, ``"tip"``."""
         if group == "hook" and self.columns.hook == ABSENT:
             group = "load"
-        if group in THREES:
-            first = 3 * THREES.index(group)
-        else:
-            first = getattr(self.columns, group)
+        is_always = group in THREES
+        first = 3 * THREES.index(group) if is_always else getattr(self.columns, group)
         return self._zeros if first == ABSENT else self.stored[:, first : first + 3]
 
     def __getitem__(self, name: str) -> Array:

@@ -75,9 +75,7 @@ def full_speed(u: float, drive: Drivable) -> float:
 @equation
 def asked(hoist: float, slew: float, luff: float, p: Drives) -> Reference:
     """Speeds that the stick asks for, of commands from -1 to 1."""
-    return Reference(
-        full_speed(hoist, p.hoist), full_speed(slew, p.slew), full_speed(luff, p.luff)
-    )
+    return Reference(full_speed(hoist, p.hoist), full_speed(slew, p.slew), full_speed(luff, p.luff))
 
 
 stick = Model("stick", parameters=Drives, state=Nothing, step=nothing, sample=asked)
@@ -251,9 +249,7 @@ def offsets(inputs: FeedbackInputs, p: Offsets, h: float) -> Offset:
         y = turned.y
     if p.compensates > 0.0:
         # the point of the path over the sea, at the tip's own height
-        over_sea = Vector(
-            inputs.path_x - inputs.surge, inputs.path_y - inputs.sway, inputs.height
-        )
+        over_sea = Vector(inputs.path_x - inputs.surge, inputs.path_y - inputs.sway, inputs.height)
         compensated = to_ship(r, over_sea)
         x += compensated.x - inputs.path_x
         y += compensated.y - inputs.path_y

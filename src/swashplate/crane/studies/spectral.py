@@ -17,7 +17,6 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from swashplate.crane.axes import RATE
 from swashplate.crane.closed_loop.steering import largest_sine
 from swashplate.crane.control import Control, Settings, stages_of
 from swashplate.crane.crane import Crane

@@ -10,7 +10,7 @@ from swashplate.machine.code_generation.functions import GENERATING
 from swashplate.machine.code_generation.program import Program, program_of
 from swashplate.machine.code_generation.tracing import Trace
 from swashplate.machine.code_generation.values import Value, arguments, leaves
-from swashplate.machine.declaration import RULES, closure_hash, inlined
+from swashplate.machine.declaration import RULES, closure_hash, known_equation
 from swashplate.machine.language import parsed
 
 F = TypeVar("F", bound=Callable[..., Any])
@@ -86,7 +86,7 @@ def declared(function: Any) -> Callable[[F], F]:
 
     def decorate(rule: F) -> F:
         parsed(rule)
-        compiled: F = inlined(rule)
+        compiled: F = known_equation(rule)
         RULES[function] = compiled
         _derived_functions.clear()
         return compiled

@@ -449,9 +449,7 @@ class Code:
         if key not in self._arrays:
             self._count += 1
             name = f"%v{self._count}"
-            self._slots.append(
-                f"  {name} = alloca [{len(elements)} x {self.number}], align 64"
-            )
+            self._slots.append(f"  {name} = alloca [{len(elements)} x {self.number}], align 64")
             self._arrays[key] = name
         for place, text in enumerate(elements):
             self.store(text, self._arrays[key], place * (self.wide or 1))

@@ -23,7 +23,7 @@ from swashplate.machine.code_generation.values import (
     node_of,
     rebuilt,
 )
-from swashplate.machine.declaration import inlined
+from swashplate.machine.declaration import known_equation
 from swashplate.machine.graph import ONE, ZERO, Call, DerivativeRule, Node, choose, make, names_in
 from swashplate.machine.language import Parsed, is_named_tuple
 
@@ -40,7 +40,7 @@ TINY = 1e-300
 # --- as they are called ---------------------------------------------------------------------------
 
 
-@inlined
+@known_equation
 def root(residual: Callable[..., float], low: float, high: float, *arguments: Any) -> float:
     """Where a residual is zero within a bracket.
 
@@ -99,7 +99,7 @@ def root(residual: Callable[..., float], low: float, high: float, *arguments: An
     return best
 
 
-@inlined
+@known_equation
 def interpolate(x: float, knots: tuple[float, ...], values: tuple[float, ...]) -> float:
     """Piecewise linear interpolation in a table; beyond its ends the last values hold.
 
@@ -120,7 +120,7 @@ def interpolate(x: float, knots: tuple[float, ...], values: tuple[float, ...]) -
     return values[at] + min(max(0.0, share), 1.0) * (values[at + 1] - values[at])
 
 
-@inlined
+@known_equation
 def past(history: Any, age: float) -> float:
     """What an input was some time ago, straight between its samples.
 
@@ -141,7 +141,7 @@ def past(history: Any, age: float) -> float:
     return newest  # as where a record begins: nothing has changed yet
 
 
-@inlined
+@known_equation
 def repeated(step: Callable[..., S], count: float, state: S, *arguments: Any) -> S:
     """State after a step has been done several times.
 

@@ -1,12 +1,11 @@
 """Machine code of functions in LLVM's language, made once on a machine and kept on disk.
 
-The passes and the processor's instructions are those that Numba takes for kernels, so that numbers
-are the same to the last bit wherever an equation is compiled.
+All are made by the same passes for the same processor, so that numbers are the same to the last bit
+wherever an equation is compiled.
 """
 
 from __future__ import annotations
 
-import os
 from collections.abc import Sequence
 from ctypes import CFUNCTYPE, addressof, c_char, c_double, c_int64, c_void_p
 from functools import cache
@@ -19,6 +18,7 @@ from llvmlite import binding as llvm
 from numpy.typing import NDArray
 
 from swashplate import progress
+from swashplate.environment import told_processor
 from swashplate.machine.cache import COMPILING
 from swashplate.machine.keeping import cached_on_disk
 
@@ -27,7 +27,7 @@ _COMPILING = RLock()
 SYMBOL = "code"
 """Name of every function within its own module."""
 OPTIMISATION_LEVEL = 3
-"""Of optimisation, as Numba's."""
+"""Of optimisation."""
 
 
 def address_of(array: NDArray[Any]) -> int:
@@ -103,9 +103,9 @@ def _host() -> tuple[str, str, str]:
     """The machine that code is made for: triple, processor, and what that can do."""
     llvm.initialize_native_target()
     llvm.initialize_native_asmprinter()
-    triple, told = llvm.get_process_triple(), os.environ.get("NUMBA_CPU_NAME")
+    triple, told = llvm.get_process_triple(), told_processor()
     if told and told != "host":
-        return triple, told, os.environ.get("NUMBA_CPU_FEATURES", "")
+        return triple, told, ""
     return triple, llvm.get_host_cpu_name(), llvm.get_host_cpu_features().flatten()
 
 

@@ -538,7 +538,9 @@ class Trace:
         place = make("segment", x, *knots)
         self.label(place, "segment")
         following = make("+", place, ONE)
-        ends = [make("element", at, *table) for table in (knots, values) for at in (place, following)]
+        ends = [
+            make("element", at, *table) for table in (knots, values) for at in (place, following)
+        ]
         return self._between(x, *ends)
 
     def _between(self, x: Node, left: Node, right: Node, low: Node, high: Node) -> Node:

@@ -35,8 +35,8 @@ from .run import PartNumbers as PartNumbers
 from .run import Start as Start
 from .run import called as called
 from .run import marched as marched
-from .run import unchecked_march as unchecked_march
 from .run import outside as outside
+from .run import unchecked_march as unchecked_march
 from .run import unstable_step as unstable_step
 from .sample_code import CodeForm as CodeForm
 from .sample_code import SampleCode as SampleCode
@@ -44,8 +44,6 @@ from .sample_code import output_of as output_of
 from .simulation import read_only as read_only
 from .start_code import started_by as started_by
 from .stepping import CompiledStep as CompiledStep
-from .stepping import bound_step as bound_step
 from .stepping import StepContext as StepContext
-from .stepping import compiled_step as compiled_step
-from .stepping import step as step
+from .stepping import bound_step as bound_step
 from .stepping import stored_of as stored_of

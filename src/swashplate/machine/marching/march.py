@@ -95,9 +95,9 @@ class March:
             signal: code.load("%records", index, "ptr")
             for index, signal in enumerate(sample_code.signals)
         }
-        first = len(sample_code.signals)
+        given = len(sample_code.signals)
         self._between = {
-            tap.between: code.load("%records", first + tap.between, "ptr")
+            tap.between: code.load("%records", given + tap.between, "ptr")
             for tap in sample_code.late
         }
         self._states = {

@@ -1,20 +1,4 @@
-"""One sample of a model, compiled, for kernels that close loops around models.
-
-Examples
---------
->>> machine = Machine(model, Valve(0.05, 0.1))
->>> valve = compiled_step(machine, ("command",), ("position",), rate=512.0)
->>> @kernel
-... def positioned(context, target, path):
-...     worst = inf
-...     for n in range(path.size):
-...         context.inputs[0] = 5.0 * (target - context.outputs[0])
-...         worst = min(worst, step(context))
-...         path[n] = context.outputs[0]
-...     return worst
->>> context = valve.context()
->>> valve.check(context, positioned(context, 0.2, path))
-"""
+"""One sample of a model, compiled, for loops in Python."""
 
 from __future__ import annotations
 
@@ -30,14 +14,13 @@ from numpy.typing import NDArray
 from swashplate.errors import InputError
 from swashplate.machine.code_generation.functions import generating
 from swashplate.machine.code_generation.machine_code import address_of, code_of_text
-from swashplate.machine.declaration import JIT_OFF, inlined
+from swashplate.machine.declaration import JIT_OFF
 from swashplate.machine.keeping import cached_on_disk, key_of
 from swashplate.machine.marching.derivatives import OLDEST
 from swashplate.machine.marching.interpreting import InterpretedMarch
 from swashplate.machine.marching.kernels import FLOATS, INTS
 from swashplate.machine.marching.march import step_texts
 from swashplate.machine.marching.part_code import SignalId
-from swashplate.machine.marching.record import check_rate
 from swashplate.machine.marching.run import (
     Machine,
     Start,
@@ -120,29 +103,11 @@ ROOM = 500
 """Least number of samples that are put behind each other before they are moved."""
 
 
-def call_step(context: StepContext) -> None:
-    """Run the step of a context; for Numba see `numba_kernels`."""
-    bound_step(context)()
-
-
 def bound_step(context: StepContext) -> Callable[[], None]:
     """What runs the step of a context again and again, which must be kept meanwhile."""
     if not isinstance(context.code, int):
         return partial(context.code, context)
     return partial(_STEP(context.code), address_of(context.words))
-
-
-@inlined
-def step(context: StepContext) -> float:
-    """Take a model to the next sample, in a `kernel`.
-
-    It reads ``context.inputs``, fills ``context.outputs`` with the same sample, takes the state to
-    the next one, and returns the margin of the model's domain. The same for all models: which one
-    is stepped follows from the context.
-    """
-    call_step(context)
-    margin: float = context.margin[0]
-    return margin
 
 
 class _InterpretedStep:
@@ -196,14 +161,10 @@ def _step_of(model: Model, form: CodeForm, stored: tuple[SignalId, ...]) -> tupl
 
 
 class CompiledStep:
-    """A model's compiled step: one sample, for kernels that close loops around it.
-
-    Made by `compiled_step`, and for drives by `Drive.compiled_step`.
+    """A model's compiled step: one sample, with the numbers of `simulate` to the last bit.
 
     Attributes
     ----------
-    step : callable
-        `step`, the same for all models; numbers are those of `simulate` to the last bit.
     inputs, outputs : tuple of str
         Names, in the arrays' order.
     """
@@ -221,11 +182,6 @@ class CompiledStep:
         self._prepare, self._code, self._count = _step_of(
             instance.model, instance.form(self.inputs), tuple(stored)
         )
-
-    @property
-    def step(self) -> Any:
-        """`step`, which a `kernel` calls with a context."""
-        return step
 
     def __repr__(self) -> str:
         return (
@@ -282,33 +238,6 @@ class CompiledStep:
         """
         check_domain(self._instance, context.states, margin, cause)
         check_outputs(self._instance, self._stored, context.outputs, self._h, cause)
-
-
-def compiled_step(
-    machine: Machine,
-    inputs: Sequence[str],
-    outputs: Sequence[str],
-    rate: float,
-) -> CompiledStep:
-    """Compiled step of a machine, for kernels that close loops around it.
-
-    Parameters
-    ----------
-    machine : Machine
-        A model with its numbers.
-    inputs, outputs : sequence of str
-        Signals that the loop gives and takes; inputs with a default parameter may be left out.
-        ``"limits"`` as an output are the acting limits of the last part that has any, a bit each.
-    rate : float
-        Samples a second. [Hz]
-
-    Raises
-    ------
-    InputError
-        For signals that the model does not have, and a rate at which its equations are unstable.
-    """
-    check_rate(rate)
-    return CompiledStep(machine, inputs, stored_of(machine.model, outputs), 1.0 / rate)
 
 
 def stored_of(model: Model, outputs: Sequence[str]) -> tuple[SignalId, ...]:
