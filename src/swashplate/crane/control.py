@@ -22,8 +22,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from swashplate.crane.axes import RATE
-from swashplate.crane.closed_loop.seeing import Sensing
-from swashplate.crane.crew import HumanOperator
+from swashplate.crane.stages.crew import HumanOperator
+from swashplate.crane.stages.seeing import Sensing
 from swashplate.errors import InputError
 from swashplate.machine import Model
 
@@ -335,7 +335,7 @@ class Crew(Control):
 
     The hand is at the joysticks, in addition to the command; it cannot move the tip faster than the
     drives. The operator sees the swing from a cab that rolls with the ship, knows nothing of the
-    ship's motion, and sees without `Sensors`. `swashplate.crane.crew` has the equations.
+    ship's motion, and sees without `Sensors`. `swashplate.crane.stages.crew` has the equations.
 
     No number was measured on a crane's operator: all are assumed. Delay and lag are like those of
     people at a joystick who track a target on a screen (0.23 and 0.32 s, 9.6 and 12 rad/s, as

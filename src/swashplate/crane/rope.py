@@ -21,8 +21,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from swashplate.crane.kinematics import Vector, add_scaled, axes_of, dot, norm, vector_of
 from swashplate.errors import InputError
-from swashplate.machine import Definition, Machine, Model, equation
-from swashplate.machine.marching import stored_of, unchecked_march
+from swashplate.machine import Definition, Machine, Model, equation, simulate
 from swashplate.results import Result
 
 Array = NDArray[np.float64]
@@ -504,7 +503,7 @@ def load_motion(
             pull=float(elastic_pull(stretch, stretch, float(rope[0]), s, h)),
             stretch=stretch,
         )
-    out = _led(Path(s, now), tips, rope, h)
+    out = _led(Path(s, now), tips, rope, rate)
     failed = int(np.argmax(out[6] < 0.0))
     if out[6, failed] < 0.0:
         raise InputError(too_fast_sentence(float(rope[failed]), failed / rate, rate))
@@ -513,16 +512,12 @@ def load_motion(
     return LoadMotion(out[:3].T, out[6], out[3:6].T if s.sling > 0.0 else None)
 
 
-def _led(numbers: Path, tips: Array, rope: Array, h: float) -> Array:
+def _led(numbers: Path, tips: Array, rope: Array, rate: float) -> Array:
     """(7, n) load, hook and pull of a load that is led along a path."""
-    machine = Machine(path, numbers)
-    inputs = {f"tip_{axis}": np.ascontiguousarray(tips[:, i]) for i, axis in enumerate("xyz")}
-    inputs["rope"] = rope
+    inputs = {f"tip_{axis}": tips[:, i] for i, axis in enumerate("xyz")}
+    run = simulate(Machine(path, numbers), inputs | {"rope": rope}, rate)
     names = [f"{point}.{axis}" for point in ("load", "hook") for axis in "xyz"]
-    stored = stored_of(path, [*names, "pull"])
-    start = machine.start(dict.fromkeys(inputs, 0.0), h, "rest")
-    out, _ = unchecked_march(machine, inputs, h, start, stored)
-    return out
+    return np.stack([run[name] for name in (*names, "pull")])
 
 
 def swing_of(load: Array, tip: Array) -> Array:

@@ -176,6 +176,14 @@ def content_of(what: Drive | Machine, step: float, *, prefix: str = "swp") -> Co
             stacklevel=3,
         )
     machine.check_step(step)
+    for part in machine.model.parts:
+        for tap in part.taps.values():
+            if tap.late or tap.longest:
+                raise InputError(
+                    f"{machine.name}: {part.path} takes '{part.wired.get(tap.signal, tap.signal)}' "
+                    "a sample late, or looks back at an age that changes. This is not exported: "
+                    "export the machine without its control, as crane.plant."
+                )
     if isinstance(machine, Drive):  # its names and value references never change
         exported = exported_drive(machine)
         references, descriptions = DRIVE, DRIVE_OPTIONS | descriptions_of(exported)

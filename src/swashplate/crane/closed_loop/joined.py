@@ -8,10 +8,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from swashplate.analysis.compensation import InverseMap
-from swashplate.crane import crew
+from swashplate.analysis import InverseMap
 from swashplate.crane.axes import AXES, RATE
-from swashplate.crane.closed_loop import seeing, steering
 from swashplate.crane.control import Controller, Settings
 from swashplate.crane.crane import Crane
 from swashplate.crane.kinematics import (
@@ -28,6 +26,7 @@ from swashplate.crane.motion import Body, Brake, Ship
 from swashplate.crane.motion import body as body_model
 from swashplate.crane.motion import brake as brake_model
 from swashplate.crane.rope import GRAVITY, hanging_load
+from swashplate.crane.stages import crew, seeing, steering
 from swashplate.errors import InputError
 from swashplate.machine import Machine, equation, join, late
 

@@ -19,7 +19,6 @@ from swashplate.crane.closed_loop.joined import (
     Loop,
     closed_loop,
 )
-from swashplate.crane.closed_loop.seeing import ROUNDING
 from swashplate.crane.closed_loop.signals import (
     ABSENT,
     ROWS,
@@ -35,6 +34,7 @@ from swashplate.crane.kinematics import Geometry, Home
 from swashplate.crane.machines import SPEED, Placing, body_numbers
 from swashplate.crane.motion import Body
 from swashplate.crane.rope import Hanging, swing_of, too_fast_sentence
+from swashplate.crane.stages.seeing import ROUNDING
 from swashplate.drive import Drive
 from swashplate.errors import DomainError, InputError
 from swashplate.machine import Machine

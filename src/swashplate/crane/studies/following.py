@@ -11,10 +11,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from swashplate.crane.axes import AXES
-from swashplate.crane.closed_loop.steering import largest_sine
 from swashplate.crane.crane import Crane
 from swashplate.crane.kinematics import boom_at, reach_rate, tip_of
 from swashplate.crane.sea.seaway import SEA_STATES, Seaway, Spectrum
+from swashplate.crane.stages.steering import largest_sine
 from swashplate.crane.studies.spectral import tip_motion
 from swashplate.errors import InputError
 from swashplate.results import Drawn

@@ -17,15 +17,15 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from swashplate.crane.closed_loop.steering import largest_sine
 from swashplate.crane.control import Control, Settings, stages_of
 from swashplate.crane.crane import Crane
-from swashplate.crane.crew import HumanOperator
 from swashplate.crane.kinematics import boom_at, reach_rate, tip_of
 from swashplate.crane.limits import LIMITED
 from swashplate.crane.rope import GRAVITY, Suspension
 from swashplate.crane.sea.extremes import THREE_HOURS, largest_of_gaussian
 from swashplate.crane.sea.seaway import BAND, Seaway
+from swashplate.crane.stages.crew import HumanOperator
+from swashplate.crane.stages.steering import largest_sine
 from swashplate.errors import InputError
 from swashplate.results import Result
 from swashplate.tables import Column, Table

@@ -57,8 +57,9 @@ HUGE_VAL HUGE_VALF HUGE_VALL MATH_ERRNO MATH_ERREXCEPT FP_NAN FP_INFINITE FP_ZER
 FP_NORMAL FP_FAST_FMA FP_FAST_FMAF FP_FAST_FMAL FP_ILOGB0 FP_ILOGBNAN FLT_RADIX FLT_ROUNDS
 FLT_EVAL_METHOD DECIMAL_DIG fpclassify isnormal isgreater isgreaterequal isless islessequal
 islessgreater isunordered
-isfinite isnan isinf signbit lesser_of greater_of segment_of whole_power whole_number fabs fmod pow ldexp
-frexp modf ceil round trunc rint cosh sinh tanh acosh asinh atanh cbrt log10 log2 log1p exp2 expm1 erf
+isfinite isnan isinf signbit lesser_of greater_of segment_of whole_power whole_number fabs fmod pow
+ldexp frexp modf ceil round trunc rint cosh sinh tanh acosh asinh atanh cbrt log10 log2 log1p exp2
+expm1 erf
 erfc gamma lgamma tgamma fmin fmax fdim fma j0 j1 jn y0 y1 yn index time signal div abs linux unix
 """.split()  # noqa: SIM905
 )

@@ -19,10 +19,10 @@ from __future__ import annotations
 from math import cos, sin, sqrt
 from typing import NamedTuple
 
-from swashplate.crane.closed_loop.steering import Drivable
 from swashplate.crane.kinematics import Boom, Geometry, Vector, reach_rate, rotation, to_ship
 from swashplate.crane.motion import SHIP, Ship
 from swashplate.crane.rope import GRAVITY
+from swashplate.crane.stages.steering import Drivable
 from swashplate.machine import Model, Tap, equation
 
 

@@ -14,7 +14,6 @@ from __future__ import annotations
 from math import pi, sqrt
 from typing import Any, NamedTuple
 
-from swashplate.crane.closed_loop.seeing import Nothing, nothing
 from swashplate.crane.kinematics import (
     Boom,
     Geometry,
@@ -30,6 +29,7 @@ from swashplate.crane.kinematics import (
 )
 from swashplate.crane.motion import SHIP, Ship
 from swashplate.crane.rope import GRAVITY
+from swashplate.crane.stages.seeing import Nothing, nothing
 from swashplate.machine import History, Model, Tap, equation, interpolate, past
 from swashplate.parameters import FULL_VOLTAGE
 
