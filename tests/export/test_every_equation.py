@@ -22,8 +22,6 @@ from swashplate.machine.code_generation import Loops, helpers_in
 
 REFUSED = ("rubbing", "rubbed")
 """Constructs of which there are none in C: an option that is a tuple of numbers, or None."""
-TWINLESS = ("turned_back", "shared_out")
-"""Constructs that Numba does not compile: the operations in them are those of others."""
 CONSTRUCTS = equations_of(vars(test_constructs))
 
 
@@ -105,9 +103,7 @@ def looped(x: float, on: bool | None) -> float:
 
 SETS = {
     "packaged": EQUATIONS,
-    "constructs": {
-        name: each for name, each in CONSTRUCTS.items() if name not in (*REFUSED, *TWINLESS)
-    },
+    "constructs": {name: each for name, each in CONSTRUCTS.items() if name not in REFUSED},
     "own": equations_of(globals()),
 }
 CASES = [

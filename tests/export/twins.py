@@ -1,7 +1,8 @@
-"""An equation in C and compiled by Python, both over rows of numbers, for their bits."""
+"""An equation in C and in LLVM's language, both over rows of numbers, for their bits."""
 
 import ctypes
 import math
+import re
 import typing
 from collections.abc import Iterator, Mapping
 from typing import Any
@@ -9,12 +10,16 @@ from typing import Any
 import numpy as np
 
 from swashplate.export.c_source import EquationInC, equation_in_c
-from swashplate.machine import kernel
-from swashplate.machine.code_generation import Loops, helpers_in
-from swashplate.machine.declaration import remember_text
+from swashplate.machine.code_generation import Loops, Trace, arguments, helpers_in, leaves
+from swashplate.machine.code_generation.llvm import Code
+from swashplate.machine.code_generation.machine_code import code_of_text
+from swashplate.machine.graph import ZERO, ordered
 from swashplate.machine.language import is_named_tuple, parsed
+from swashplate.machine.marching.kernels import FLOATS
 
 CALLS = 3000
+MODERATE = 1e4
+"""What numbers stay below, and one over them too, that whole numbers are made of."""
 SPECIAL = np.array(
     [math.nan, 0.0, -0.0, math.inf, -math.inf, 5e-324, -5e-324, 1e-310, -2e-308, 1.0, -1.0, 1e300]
 )
@@ -81,44 +86,42 @@ def caller(number: int, made: EquationInC, columns: list[str]) -> str:
 
 
 class Twin:
-    """Python of an equation over rows of numbers, with its options decided."""
+    """An equation in LLVM's language over rows of numbers, with its options decided."""
 
     def __init__(self, equation: Any, on: bool) -> None:
-        self.names, self.on = {"f": equation, "np": np}, on
         hints = hints_of(equation)
-        back = hints.pop("return")
+        del hints["return"]
+        self.on = on
         self.columns = [each for name, hint in hints.items() for each in scalars(hint, name)]
-        self.count = 0
-        given = [self.value(hint, name) for name, hint in hints.items()]
-        lines = ["    for i in range(rows.shape[0]):", f"        r = f({', '.join(given)})"]
-        out = list(self.scalar(back, "r"))
-        self.width = len(out)
-        lines += [f"        out[i, {j}] = {each}" for j, each in enumerate(out)]
-        self.text = "\n".join(["@kernel", "def rows_of(rows, out):", *lines, ""])
+        lengths = {k: v for n, h in hints.items() for k, v in open_lengths(h, n)}
+        given = arguments(parsed(equation), None, lengths)
+        self.results = [node for _, node in leaves(Trace().call(equation, given))]
+        self.width = len(self.results)
 
-    def value(self, hint: Any, path: str) -> str:
-        items = items_of(hint, path)
-        if items is not None:
-            inner = ", ".join(self.value(each, below) for below, each in items)
-            if not is_named_tuple(hint):
-                return f"({inner},)"
-            self.names[hint.__name__] = hint
-            return f"{hint.__name__}({inner})"
-        ((word, _),) = scalars(hint, path)
-        place = f"rows[i, {self.count}]"
-        self.count += 1
-        if word == "flag":
-            return "True" if self.on else "None"
-        return {"double": place, "int": f"int({place})"}.get(word, f"{place} != 0.0")
+    @property
+    def counts(self) -> bool:
+        """Whether it makes whole numbers, which C has not of what is none, or is huge."""
+        nodes = ordered(self.results)
+        return any(node.op in ("floor", "call") for node in nodes)
 
-    def scalar(self, hint: Any, text: str) -> Iterator[str]:
-        items = items_of(hint, "")
-        if items is None:
-            yield f"1.0 if {text} else 0.0" if hint is bool else text
-        for below, each in items or ():
-            name = below.removeprefix(".")
-            own = f"{text}.{name}" if is_named_tuple(hint) else f"{text}[{name}]"
-            yield from self.scalar(each, own)
+    def over(self, rows: np.ndarray) -> np.ndarray:
+        """What the compiled equation gives for rows, a column for each argument."""
+        places = {path: place for place, (_, path) in enumerate(self.columns)}
+        code = Code([("i64", "count"), ("ptr", "rows"), ("ptr", "out")])
+        with code.loop("0", "%count") as at:
+            row = code.put(f"mul i64 {at}, {len(self.columns)}")
+            known = {}
+            for node in ordered(self.results):
+                if node.op == "name":
+                    place = places[re.sub(r"\[(\d+)\]", r".\1", node.value)]
+                    text = code.load("%rows", code.put(f"add i64 {row}, {place}"))
+                    known[node] = code.as_test(ZERO, text) if node.kind == "bool" else text
+            out = code.put(f"mul i64 {at}, {self.width}")
+            for place, text in enumerate(code.floats(self.results, known)):
+                code.store(text, "%out", code.put(f"add i64 {out}, {place}"))
+        results = np.empty((len(rows), self.width))
+        code_of_text("twin", code.text, ("int", FLOATS, FLOATS))(len(rows), rows, results)
+        return results
 
 
 def rows(columns: list[tuple[str, str]], on: bool, seed: int) -> np.ndarray:
@@ -167,13 +170,6 @@ def flagged(equation: Any) -> bool:
     return any(word == "flag" for name, h in hints.items() for word, _ in scalars(h, name))
 
 
-def compiled(text: str, names: Mapping[str, Any]) -> dict[str, Any]:
-    """A module of kernels, executed."""
-    space = {**vars(math), "kernel": kernel, **names}
-    exec(compile(text, remember_text("twin", text), "exec"), space)
-    return space
-
-
 class InC:
     """Equations as one source of C, with a function for each that takes numbers in a row."""
 
@@ -195,13 +191,11 @@ class InC:
         """The same bits from both, for some thousand rows."""
         twin = Twin(self.equations[key], on)
         given = rows(twin.columns, on, self.numbers[key])
-        wanted, found = np.empty((CALLS, twin.width)), np.empty((CALLS, twin.width))
-        made = compiled(twin.text, twin.names)
-        try:
-            made["rows_of"](given, wanted)
-        except ZeroDivisionError:  # 0 to a negative power, where C goes on with infinity
-            given[given == 0.0] = 1.0
-            made["rows_of"](given, wanted)
+        if twin.counts:
+            size = np.abs(given)
+            given = np.where((size > 1.0 / MODERATE) & (size < MODERATE), size, size != 0.0)
+        wanted = twin.over(given)
+        found = np.empty((CALLS, twin.width))
         call = getattr(library, f"call_{self.numbers[key]}")
         double = ctypes.POINTER(ctypes.c_double)
         for i in range(CALLS):
