@@ -193,7 +193,7 @@ class InC:
         given = rows(twin.columns, on, self.numbers[key])
         if twin.counts:
             size = np.abs(given)
-            given = np.where((size > 1.0 / MODERATE) & (size < MODERATE), size, size != 0.0)
+            given = np.where((size > 1.0 / MODERATE) & (size < MODERATE), size, 1.0)
         wanted = twin.over(given)
         found = np.empty((CALLS, twin.width))
         call = getattr(library, f"call_{self.numbers[key]}")
