@@ -148,7 +148,6 @@ WRONG: list[tuple[Callable[..., Any], tuple[Any, ...], str]] = [
         "class of named tuples",
     ),
     (lambda rate: HOIST.stepper(rate), ("a", None, inf), "rate .* between"),
-    (lambda rate: HOIST.compiled_step(rate=rate), ("a", inf, -1.0), "rate .* above 0"),
     (lambda rate: HOIST.simulate([1.0, 2.0], rate), ("a", None, nan), "rate .* between"),
     (lambda at: HOIST.linearize(at), ("a", nan, inf), "finite number of volts"),
     (lambda at: HOIST.steady_speed(at), ("a", nan, [[1.0], [1.0, 2.0]]), "finite commands"),

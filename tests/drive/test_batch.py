@@ -9,7 +9,6 @@ from typing import NamedTuple
 import numpy as np
 import polars as pl
 import pytest
-from numba import config
 
 from swashplate import (
     Drive,
@@ -21,6 +20,7 @@ from swashplate import (
     Threads,
     simulate_many,
 )
+from swashplate.environment import compiles, told_processor
 from swashplate.machine import Machine, Model, Tap, equation, simulate
 from swashplate.machine.code_generation.machine_code import optimised
 from swashplate.machine.marching import CodeForm, SampleCode, output_of
@@ -312,8 +312,8 @@ def test_names_of_equations_are_not_those_of_the_march(hoist: Drive) -> None:
         np.testing.assert_array_equal(speed, drive.replace(Z10=Z10).simulate(voltage).shaft_speed)
 
 
-@pytest.mark.skipif(bool(config.DISABLE_JIT), reason="nothing is compiled")
-@pytest.mark.skipif(config.CPU_NAME == "generic", reason="vectors of two do not pay")
+@pytest.mark.skipif(not compiles(), reason="nothing is compiled")
+@pytest.mark.skipif(told_processor() == "generic", reason="vectors of two do not pay")
 def test_the_sets_are_marched_as_vectors() -> None:
     signal, integral = output_of(pump_drive, "shaft_speed")
     sample_code = SampleCode(pump_drive, CodeForm(("current",), (None, PumpOptions())), [signal])

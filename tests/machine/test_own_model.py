@@ -467,7 +467,7 @@ def test_a_model_that_cannot_be_marched_is_refused(options: dict[str, Any], sent
 TANK, PUMP = Model("tank", Outlet, Fill, filled), Model("pump", Outlet, Flow, returned)
 FED = Model("tank", Outlet, Fill, filled, taps={"flow": Tap("inflow")})
 LATE = "needs 'level', which is known only after tank: put tank before pump"
-LOOP = "a loop must be one model, or be closed sample by sample"
+LOOP = "a loop takes a signal a sample late, late[(].flow.[)], or is one model"
 LOAD = Model("load", Outlet, Load, pulled)
 JOINED = {
     "order": ((PUMP, FED), {}, f"Model x: pump {LATE}"),

@@ -45,7 +45,7 @@ app = typer.Typer(rich_markup_mode="rich")
 
 @command(app, "doctor", examples="swashplate doctor", units=False)
 def doctor() -> None:
-    """Show versions, cores, compiled kernels and extras, and check a simulation.
+    """Show versions, cores, compiled code and extras, and check a simulation.
 
     Paste the output into a question or a problem report. Exit code 1: the
     simulation does not give the published speed.
@@ -89,7 +89,7 @@ def doctor() -> None:
         note(no_cache_reason())
     else:
         sizes = [path.stat().st_size for path in cache.rglob("*.nbc")]
-        note(f"Compiled kernels: {len(sizes)} files, {sum(sizes) / 1e6:.1f} MB, below {cache}")
+        note(f"Compiled code: {len(sizes)} files, {sum(sizes) / 1e6:.1f} MB, below {cache}")
     if not well:
         raise typer.Exit(1)
 

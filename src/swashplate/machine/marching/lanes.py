@@ -145,7 +145,7 @@ def rest_text(sample_code: SampleCode) -> str:
 def lanes_text(sample_code: SampleCode, signal: SignalId, *, integral: bool) -> str:
     """Text of the march of LANES sets over one record, for one signal or its integral."""
     code = Code(MARCH, LANES)
-    march = March(sample_code, code)
+    march = March(sample_code, code, first="0")
     zero = code.constant(0.0)
     cost, rate, total = (code.variable(zero) for _ in range(3))
     with code.loop("0", "%count") as n:

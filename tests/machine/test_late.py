@@ -1,0 +1,215 @@
+"""Loops of parts that take signals a sample late, and the past at an age that changes."""
+
+from math import sin
+from typing import NamedTuple
+
+import numpy as np
+import pytest
+
+from swashplate import InputError, join, linearize, simulate, simulate_many
+from swashplate.errors import EquationError
+from swashplate.export import content_of
+from swashplate.machine import (
+    History,
+    Machine,
+    Model,
+    Tap,
+    equation,
+    late,
+    past,
+    sensitivities,
+    stepper,
+)
+
+pytestmark = pytest.mark.interpreted
+
+RATE = 512.0
+TARGET = np.sin(np.arange(300) * 0.03)
+
+
+class Law(NamedTuple):
+    gain: float = 1.3
+    first: float = 0.7
+    memory: float = 0.1
+
+
+class Count(NamedTuple):
+    n: float = 0.0
+
+
+class Push(NamedTuple):
+    push: float
+
+
+@equation
+def counted(state: Count) -> Count:
+    return Count(state.n + 1.0)
+
+
+@equation
+def looking_back(state: Count, target: float, level: float, history: History, p: Law) -> Push:
+    before = past(history, 3.0 + 2.0 * sin(state.n))
+    return Push(p.gain * (target - level) + 0.1 * before)
+
+
+@equation
+def plain(target: float, level: float, p: Law) -> Push:
+    return Push(p.gain * (target - level))
+
+
+@equation
+def at_rest() -> Count:
+    return Count(0.0)
+
+
+class Tank(NamedTuple):
+    inflow: float = 5.0
+
+
+class Level(NamedTuple):
+    height: float = 0.5
+
+
+class Seen(NamedTuple):
+    level: float
+
+
+@equation
+def seen(state: Level, push: float) -> Seen:
+    return Seen(state.height + 0.1 * push)
+
+
+@equation
+def filled(state: Level, push: float, p: Tank, h: float) -> Level:
+    return Level(state.height + p.inflow * push * h)
+
+
+@equation
+def settled(push: float) -> Level:
+    return Level(0.3 - 0.5 * push)
+
+
+tank = Model("tank", Tank, Level, filled, seen, settled=settled)
+remembering = Model(
+    "law", Law, Count, counted, looking_back, taps={"history": Tap("history", longest="memory")}
+)
+forgetful = Model("law", Law, Count, counted, plain, settled=at_rest)
+LEVEL = late("tank.level", "first")
+
+
+def closed(law: Model, **links) -> Machine:
+    members = {"law": Machine(law, Law()), "tank": Machine(tank, Tank())}
+    return join("loop", members, links={"tank.push": "law.push", "law.level": LEVEL, **links})
+
+
+def by_hand(target: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Levels and pushes, sample by sample."""
+    height, levels, pushes = 0.5, [], []
+
+    def level_at(n):
+        return levels[n] if n >= 0 else 0.7
+
+    for n, wanted in enumerate(target):
+        age = 3.0 + 2.0 * np.sin(n)
+        whole = int(age)
+        newer, older = level_at(n - 1 - whole), level_at(n - 2 - whole)
+        before = newer + (age - whole) * (older - newer)
+        push = 1.3 * (wanted - level_at(n - 1)) + 0.1 * before
+        levels.append(height + 0.1 * push)
+        pushes.append(push)
+        height += 5.0 * push / RATE
+    return np.array(levels), np.array(pushes)
+
+
+def test_a_loop_has_the_numbers_of_one_written_by_hand():
+    run = simulate(closed(remembering, **{"law.history": LEVEL}), {"law.target": TARGET}, RATE)
+    levels, pushes = by_hand(TARGET)
+    np.testing.assert_array_equal(run["tank.level"], levels)
+    np.testing.assert_array_equal(run["law.push"], pushes)
+
+
+def test_a_stepper_has_the_numbers_of_the_whole_run():
+    machine = closed(remembering, **{"law.history": LEVEL})
+    target = np.tile(TARGET, 5)
+    run = simulate(machine, {"law.target": target}, RATE)
+    made = stepper(machine, ["law.target"], ["tank.level"], rate=RATE)
+    stepped = [made.step(each)["tank.level"] for each in target.tolist()]
+    np.testing.assert_array_equal(stepped, run["tank.level"])
+
+
+def test_many_sets_at_once_have_the_numbers_of_each():
+    machine = closed(remembering, **{"law.history": LEVEL})
+    gains = [1.3, 0.9, 1.1, 0.2, 1.7]
+    batch = simulate_many(
+        machine, {"law.gain": gains}, {"law.target": TARGET}, RATE, output="tank.level"
+    )
+    for gain, levels in zip(gains, batch.output, strict=True):
+        alone = simulate(machine.replace({"law.gain": gain}), {"law.target": TARGET}, RATE)
+        np.testing.assert_array_equal(levels, alone["tank.level"])
+
+
+def test_derivatives_go_round_the_loop():
+    machine, inputs = closed(forgetful), {"law.target": TARGET}
+    exact = sensitivities(machine, inputs, RATE, parameters=["law.gain", "tank.inflow"])
+    for k, name in enumerate(("law.gain", "tank.inflow")):
+        value, step = machine.numbers[name], 1e-6
+        up, down = (
+            simulate(machine.replace({name: value + sign * step}), inputs, RATE)["tank.level"]
+            for sign in (1.0, -1.0)
+        )
+        np.testing.assert_allclose(
+            exact["tank.level"][:, k], (up - down) / (2.0 * step), atol=1e-8, rtol=1e-6
+        )
+
+
+def test_a_loop_settles_where_nothing_changes_any_more():
+    machine = closed(forgetful)
+    run = simulate(machine, {"law.target": np.ones(2)}, RATE, start="steady")
+    # height 0.3 - push/2, level = height + push/10 and push = 1.3 (1 - level) together
+    push = 1.3 * 0.7 / (1.0 - 1.3 * 0.4)
+    assert run["law.push"][0] == pytest.approx(push, rel=1e-12)
+
+
+def test_a_linear_model_keeps_what_comes_late():
+    model = linearize(
+        closed(forgetful), {"law.target": 0.0}, RATE, inputs=["law.target"], outputs=["tank.level"]
+    )
+    assert model.states == ("law.n", "tank.height", "tank.level_1")
+    # level' = height + 0.1 push with push = 1.3 (target - level)
+    np.testing.assert_allclose(model.A[2], [0.0, 1.0, -0.13])
+
+
+def test_what_has_no_derivatives_says_so():
+    machine = closed(remembering, **{"law.history": LEVEL})
+    with pytest.raises(InputError, match="age that changes, .* no derivatives: .* not fitted"):
+        sensitivities(machine, {"law.target": TARGET}, RATE, parameters=["law.gain"])["law.push"]
+    with pytest.raises(InputError, match=r"law\.first is what a signal was before the record"):
+        sensitivities(closed(forgetful), {"law.target": TARGET}, RATE)["law.push"]
+
+
+def test_what_comes_late_is_not_exported():
+    with pytest.raises(InputError, match=r"law takes 'tank\.level' a sample late.* not exported"):
+        content_of(closed(forgetful), 1.0 / RATE)
+
+
+def test_a_memory_is_a_parameter():
+    with pytest.raises(InputError, match="longest delay of 'history' is 'long', .* gain, first"):
+        Model(
+            "law",
+            Law,
+            Count,
+            counted,
+            looking_back,
+            taps={"history": Tap("history", longest="long")},
+        )
+
+
+@equation
+def confused(target: float, p: Law) -> Push:
+    return Push(past(target, p.gain))
+
+
+def test_only_an_input_with_a_past_has_one():
+    law = Model("law", Law, Count, counted, confused)
+    with pytest.raises(EquationError, match="past of something else .* type the input History"):
+        simulate(Machine(law, Law()), {"target": TARGET}, RATE)
