@@ -5,7 +5,7 @@
 
 A load that swings freely below a crane at rest, integrated by SciPy from its equations of motion:
 a point on a sphere, or a hook with the load on slings. Of each load there is one log of both angles
-with the sensor's zero and noise. Eight seeds in a row are two of each kind:
+with the sensor's zero and noise. Five seeds in a row are one of each kind:
 
 - plain: linear damping, in one plane or along an ellipse;
 - drag: with a resistance that grows with the square of the speed besides;
@@ -20,8 +20,8 @@ holds if it has both. The rope of a load on slings is asked only of the fit that
 `swing_damping` makes of the same log, with the angle across and the rope's nominal length, stands
 beside it.
 
-Seeds 0 to 9 are for development, 100 to 139 for judgement. The ranges were committed before the
-first load was drawn. Every load is a line of JSON.
+Seeds 0 to 9 are for development, 100 to 139 for judgement, drawn after the ranges were committed.
+Every load is a line of JSON.
 """
 
 import argparse
