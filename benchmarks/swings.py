@@ -260,14 +260,37 @@ def fitted(file: Path, model: ModelSetup, truths: dict[str, list[float]]) -> dic
             full = f"{'home' if name == 'rope' else 'hanging'}.{name}"
             estimate = result[full]
             lower, upper = estimate.interval
-            quotable = full not in verdict.undetermined and None not in (lower, upper)
-            rows.append(
-                {"name": name, "value": estimate.value, "lower": lower, "upper": upper}
-                | {"truths": truth, "quotable": quotable, "status": estimate.status}
-            )
+            row = {"name": name, "value": estimate.value, "lower": lower, "upper": upper}
+            rows.append(row | {"truths": truth})
     except SwashplateError as error:
         return {"refused": str(error)}
     return {"usable": verdict.usable, "headline": verdict.headline, "estimates": rows}
+
+
+def truths_of(load: dict) -> dict[str, list[float]]:
+    """What intervals of the fit of a load on its rope should hold."""
+    damping = slow_damping(load)
+    truths = {"swing_damping": [damping, damping * load.get("other", 1.0)]}
+    if "sling" not in load:
+        truths["rope"] = [load["rope"]]
+    return truths
+
+
+def by_command(load: dict, time: np.ndarray, degrees: np.ndarray) -> dict:
+    """What `crane damping` says of a log, or its refusal."""
+    rope = load["rope_nominal"] + load.get("sling_nominal", 0.0)
+    try:
+        swing = swing_damping(time, *np.radians(degrees), rope=rope)
+    except SwashplateError as error:
+        return {"refused": str(error)}
+    estimates = {"swing_damping": swing.damping, "rope": swing.rope}
+    rows = []
+    for name, truths in truths_of(load).items():
+        estimate = estimates[name]
+        lower, upper = estimate.interval
+        row = {"name": name, "value": estimate.value, "lower": lower, "upper": upper}
+        rows.append(row | {"truths": truths})
+    return {"usable": True, "estimates": rows}
 
 
 def judged(load: dict, folder: Path) -> dict:
@@ -277,29 +300,12 @@ def judged(load: dict, folder: Path) -> dict:
     (folder / "swing.csv").write_text("\n".join(["time,off_lead,side_lead", *rows]), "utf-8")
     file = folder / "campaign.toml"
     file.write_text(CAMPAIGN, "utf-8")
-    damping = slow_damping(load)
-    dampings = [damping] if "other" not in load else [damping, damping * load["other"]]
-    point = {"swing_damping": dampings}
-    if "sling" not in load:
-        point["rope"] = [load["rope"]]
-    found = dict(load)
+    found, point = dict(load), truths_of(load)
     found["point"] = fitted(file, setup(load, hook=False), point)
     if "sling" in load:
         own = {"swing_damping": [load["damping"]], "rope": [load["rope"]]}
         found["hook"] = fitted(file, setup(load, hook=True), own)
-    try:
-        along, across = np.radians(degrees)
-        rope = load["rope_nominal"] + load.get("sling_nominal", 0.0)
-        swing = swing_damping(time, along, across, rope=rope)
-        rows = []
-        for name, estimate in (("swing_damping", swing.damping), ("rope", swing.rope)):
-            if name in point:
-                lower, upper = estimate.interval
-                row = {"name": name, "value": estimate.value, "lower": lower, "upper": upper}
-                rows.append(row | {"truths": point[name], "quotable": True})
-        found["command"] = {"usable": True, "estimates": rows}
-    except SwashplateError as error:
-        found["command"] = {"refused": str(error)}
+    found["command"] = by_command(load, time, degrees)
     return found
 
 
@@ -313,11 +319,15 @@ FITS = {
 """What a log was fitted with, by its entry in a record."""
 
 
+WIDE = 0.1
+"""Half width from which an interval is wide, over the value. [1]"""
+
+
 def counted(records: list[dict], fit: str, name: str) -> str:
     """Cells of a table.
 
-    Logs; intervals that hold, and how many of those are not to be quoted, as they are wider than
-    10 %; those that miss; those that are refused; median half width of those that hold.
+    Logs; intervals that hold, and how many of those are wide, which a verdict says not to quote;
+    those that miss; those that are refused; median half width of those that hold.
     """
     held, wide, missed, refused, widths = 0, 0, 0, 0, []
     for record in records:
@@ -329,7 +339,7 @@ def counted(records: list[dict], fit: str, name: str) -> str:
             refused += 1
         elif holds:
             held += 1
-            wide += not row["quotable"]
+            wide += 0.5 * (ends[1] - ends[0]) > WIDE * row["value"]
             widths.append(50.0 * (ends[1] - ends[0]) / row["truths"][0])
         else:
             missed += 1

@@ -526,7 +526,7 @@ def damping(
         free_swing = swing_damping(series.time[within], *angles, rope=rope, drag=drag)
     except InputError as error:
         raise InputError(f"{log}, {column}: {error}") from None
-    columns = [Column(name, ".4g", none="-") for name in ("estimate", "lower", "upper")]
+    columns = [Column(name, ".5g", none="-") for name in ("estimate", "lower", "upper")]
     table = Table("Free swing, 95 % intervals", (Column("number"), *columns, UNIT))
     rows = (
         ("damping ratio", free_swing.damping, "%", 100.0),
@@ -535,7 +535,8 @@ def damping(
     )
     for name, number, unit, factor in rows:
         interval = [None if end is None else factor * end for end in number.interval]
-        table.add(name, factor * number.value, *interval, unit=unit)
+        value = 0.0 if number.status == "at its lower bound" else number.value
+        table.add(name, factor * value, *interval, unit=unit)
     show(table)
     for sentence in free_swing.sentences():
         say(sentence)
