@@ -126,6 +126,7 @@ class InputSignal(Result):
     """The input that drove the axis."""
 
     kind: InputKind
+    """``"none"`` commands nothing and is 0 throughout."""
     unit: str
     """SI, or as written for the kind ``"other"``."""
     time: Array

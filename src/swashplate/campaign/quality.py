@@ -182,7 +182,7 @@ def _quality(
 def _of_input(
     drive: InputSignal, low: float, high: float, limits: tuple[float, float] | None
 ) -> Iterator[str]:
-    if low == high:
+    if low == high and drive.kind != "none":
         yield "the input never changes: nothing can be identified from this run"
     if limits is not None and (low < limits[0] or high > limits[1]):
         yield (
@@ -417,6 +417,7 @@ def campaign_findings(campaign: Campaign) -> tuple[str, ...]:
                 f"run {number} ({run.file}): {key}", getattr(run, key), of_run, long
             )
     moving = {e.axis for e in campaign if e.of_kind("shaft_speed", "position", "encoder_counts")}
+    moving |= {experiment.axis for experiment in campaign if experiment.input.kind == "none"}
     findings += [
         f"axis '{axis}': no channel measures its motion; a fit of the pump needs one of the kind "
         "shaft_speed, position or encoder_counts"

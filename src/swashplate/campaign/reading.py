@@ -25,7 +25,7 @@ from swashplate.campaign.experiment import (
     assumed_accuracy,
 )
 from swashplate.campaign.overview import BlockRanges, LogWindow, Overview
-from swashplate.campaign.recognition import recognise
+from swashplate.campaign.recognition import UNNAMED, Recognised, recognise
 from swashplate.campaign.samples import ambiguous_gaps, unwrap_counts, unwrap_position
 from swashplate.campaign.schema import applying, conversion, ends, inside
 from swashplate.documents import toml_string, validated
@@ -86,6 +86,11 @@ def read_run(
     overview = None
     windows = [(log, False)]
     if rows is not None and rows > LONG:
+        if any(axis.input.kind == "none" for axis in tested.values()):
+            raise InputError(
+                f"{log.path} has {rows} rows, but a run without an input has at most {LONG}: cut "
+                "the log."
+            )
         overview = _overview(name, tested, log, rows, run.span)
         windows = [
             (replace(log, first=window.first, last=window.last), window.resumes)
@@ -171,8 +176,10 @@ def _merged(content: dict[str, Any], changes: Mapping[str, Any]) -> dict[str, An
 def _described_signals(
     axis: schema.AxisEntry,
 ) -> dict[str, schema.InputEntry | schema.ChannelEntry]:
-    """An axis's signals, by their descriptions in sentences."""
-    signals: dict[str, schema.InputEntry | schema.ChannelEntry] = {"the input": axis.input}
+    """An axis's signals that have a column, by their descriptions in sentences."""
+    signals: dict[str, schema.InputEntry | schema.ChannelEntry] = {}
+    if axis.input.kind != "none":
+        signals["the input"] = axis.input
     for name, channel in axis.channels.items():
         signals[f"channel '{name}'"] = channel
     return signals
@@ -404,9 +411,7 @@ def _experiments(
     one begins in the midst of a motion. `without` is the entry by which the run leaves the axis
     out.
     """
-    parts, _ = columns.samples("the input", axis.input, axis, run)
-    between = axis.input.interpolation
-    drive = InputSignal(**parts, interpolation=between or "linear", settled=between is not None)
+    drive = _input_of(axis, columns, run)
     notes = list[str]()
     signals = dict[str, Channel]()
     cuts = dict[float, str]()
@@ -441,7 +446,9 @@ def _experiments(
         part_notes = list(notes) if part == 0 else []
         if np.isfinite(end):
             part_notes.append(f"split at {end:.4g} s; the rest is a separate run: {cuts[end]}")
-        recognised = recognise(command.time, command.values, unit=unit)
+        recognised = Recognised(UNNAMED)
+        if command.kind != "none":
+            recognised = recognise(command.time, command.values, unit=unit)
         maneuver = run.maneuver or recognised.name
         ignored = applying((*axis.ignore, *run.ignore), maneuver)
         yield Experiment(
@@ -462,6 +469,19 @@ def _experiments(
             recorded=None if zero is None else zero + float(command.time[0]),
             notes=tuple(part_notes),
         )
+
+
+def _input_of(axis: schema.AxisEntry, columns: _Columns, run: schema.RunEntry) -> InputSignal:
+    """The input of an axis; one that commands nothing is 0 at the stamps of the first channel."""
+    if axis.input.kind != "none":
+        parts, _ = columns.samples("the input", axis.input, axis, run)
+        between = axis.input.interpolation
+        return InputSignal(**parts, interpolation=between or "linear", settled=between is not None)
+    time = columns.stamps(next(iter(axis.channels.values())), axis)
+    if run.span is not None:
+        time = np.ascontiguousarray(time[inside(run.span, time)])
+    origin = SignalOrigin(columns.log.path, "none")
+    return InputSignal("none", "1", time, np.zeros(time.size), "linear", origin)
 
 
 def _channel_of(

@@ -17,7 +17,7 @@ from swashplate.errors import InputError
 from swashplate.logs import TextOptions
 from swashplate.units import of_shaft, scaling, speed_unit
 
-InputKind = Literal["voltage", "current", "other"]
+InputKind = Literal["voltage", "current", "other", "none"]
 ChannelKind = Literal[
     "signed_current",
     "rectified_current",
@@ -29,6 +29,8 @@ ChannelKind = Literal[
     "stroker_pressure",
     "swash_angle",
     "spool_position",
+    "swing_angle",
+    "hook_position",
     "other",
 ]
 CHANNEL_KINDS: tuple[ChannelKind, ...] = get_args(ChannelKind)
@@ -60,6 +62,7 @@ KINDS: Mapping[str, Kind] = {
     "voltage": Kind(("V",), "", "the card's command, positive for positive speed",
         r"volts?|voltage|u|\w*spannung|spanning|spenning|spænding|spänning|voltaje", ("V", "mV")),
     "current": Kind(("A",), "", "signed current that drives the pump without a card"),
+    "none": Kind(("1",), "", "no input: nothing is commanded"),
     # by its name an input: channels are of this kind only if somebody says so
     "other": Kind((), "", "any other quantity, in the unit of the log",
         "cmd|command|duty|setpoint|valve|stick|joystick|joy|stellgröße|stellgroesse|sollwert|hebel|"
@@ -84,6 +87,10 @@ KINDS: Mapping[str, Kind] = {
         "angle of the swash plate, positive with the speed", "swash angle|swash|alpha"),
     "spool_position": Kind(("m",), "spool_position",
         "displacement of the spool, positive with the force", "spool position|spool"),
+    "swing_angle": Kind(("rad",), "", "angle of a rope or load from the plumb line, with a sign",
+        r"swing|sway|swing angle|sway angle|off lead|side lead|pendelwinkel|schwingwinkel"),
+    "hook_position": Kind(("m",), "", "coordinate of a hook or load",
+        r"(?:hook|load|haken|last) (?:x|y|z)"),
     "shaft_speed": Kind(("rad/s", "m/s"), "shaft_speed",
         "speed of the shaft, or of a cylinder's rod",
         rf"speed|omega|velocity|\w*geschwindigkeit|snelheid|hastighe[dt]|vitesse|velocidad|velocità|"
@@ -303,7 +310,16 @@ class SignalEntry(FileTable):
 class InputEntry(SignalEntry):
     """The signal that drives the axis."""
 
-    kind: InputKind = Field("voltage", description="voltage, current (signed, no card) or other.")
+    kind: InputKind = Field(
+        "voltage",
+        description="voltage, current (signed, no card), other; or none, if nothing is commanded, "
+        "as while a load swings freely.",
+    )
+    column: str = Field(
+        "",
+        description="Column of the log, with or without the unit in its header; none of the kind "
+        "none.",
+    )
     interpolation: Between | None = Field(
         None,
         description="Between two samples: hold the earlier one, a straight line, or a straight "
@@ -313,6 +329,12 @@ class InputEntry(SignalEntry):
     ignore: tuple[TimeWindow, ...] = Field(
         (), description="Windows whose samples are left out; the input continues across them."
     )
+
+    @model_validator(mode="after")
+    def _has_column(self) -> InputEntry:
+        if self.kind != "none" and not self.column:
+            raise ValueError("column is missing; if nothing is commanded, write kind = 'none'")
+        return self
 
     @model_validator(mode="after")
     def _of_all_maneuvers(self) -> InputEntry:

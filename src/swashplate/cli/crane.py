@@ -46,7 +46,7 @@ from swashplate.cli.terminal import (
     spinner,
 )
 from swashplate.errors import InputError
-from swashplate.tables import PAGE, Column, Form, Table
+from swashplate.tables import PAGE, UNIT, Column, Form, Table
 
 if TYPE_CHECKING:
     from swashplate.crane import Assessment, Crane, Operability, Seaway, Sweep
@@ -456,7 +456,7 @@ def sweep(
     cranes,
     "damping",
     examples="""
-        swashplate crane damping swing.csv --column swing --start 12 --stop 90 --rope 20
+        swashplate crane damping swing.csv --start 12 --stop 90 --rope 20
         swashplate crane damping swing.csv --column swing --across sway --rope 20
     """,
     units=False,
@@ -468,16 +468,12 @@ def damping(
         str,
         typer.Option(
             metavar="NAME",
-            help="Column of the angle, with its unit in the header: 'swing \\[deg]'.",
+            help="Column of the angle, with its unit in the header: 'off_lead \\[deg]'.",
         ),
-    ] = "swing",
+    ] = "off_lead",
     across: Annotated[
-        str | None,
-        typer.Option(
-            metavar="NAME",
-            help="Column of the angle across, to see whether the plane of swing turns.",
-        ),
-    ] = None,
+        str, typer.Option(metavar="NAME", help="Column of the angle across.")
+    ] = "side_lead",
     time_column: Annotated[
         str, typer.Option(metavar="NAME", help="Column of the time in LOG.")
     ] = "time",
@@ -491,12 +487,18 @@ def damping(
         float | None,
         typer.Option(metavar="M", help="Length of the rope, to check the period."),
     ] = None,
+    drag: Annotated[
+        float | None,
+        typer.Option(
+            metavar="K",
+            help="Resistance with the square of the speed in 1/m, if it is known; 0 for none.",
+        ),
+    ] = None,
 ) -> None:
-    """Estimate the damping ratio of a freely swinging load from a log of its angle.
+    """Estimate the damping ratio of a freely swinging load from a log of its angles.
 
-    A decaying sine is fitted to the signed angle in one plane, with the crane at
-    rest and at least five swings. Halves or planes of the log that do not agree
-    on the damping are refused.
+    The load of a crane at rest is fitted to signed angles in two planes, over at
+    least five swings. A log that does not show the damping is refused.
     """
     import numpy as np
 
@@ -513,25 +515,28 @@ def damping(
             f"{log} lasts from {first:g} to {last:g} s, but {begins:g} to {ends:g} s are requested."
         )
     within = (begins <= series.time) & (series.time <= ends)
-    angle_across = None
-    if across is not None:
-        other = read_series(log, across, "rad", time_column=time_column)
-        if not np.array_equal(other.time, series.time):
-            raise InputError(
-                f"{log}: columns {column} and {across} have values at different times, but must "
-                "have them at the same."
-            )
-        angle_across = other.values[within]
-    try:
-        free_swing = swing_damping(
-            series.time[within], series.values[within], across=angle_across, rope=rope
+    other = read_series(log, across, "rad", time_column=time_column)
+    if not np.array_equal(other.time, series.time):
+        raise InputError(
+            f"{log}: columns {column} and {across} have values at different times, but must "
+            "have them at the same."
         )
+    angles = series.values[within], other.values[within]
+    try:
+        free_swing = swing_damping(series.time[within], *angles, rope=rope, drag=drag)
     except InputError as error:
         raise InputError(f"{log}, {column}: {error}") from None
-    ratio = Column("damping ratio", ".3%")
-    interval = [Column(name, ".3%") for name in ("from", "to")]
-    table = Table("Free swing, 95 % interval", (ratio, *interval, Column("period", ".2f", "s")))
-    table.add(free_swing.value, free_swing.low, free_swing.high, free_swing.period)
+    columns = [Column(name, ".5g", none="-") for name in ("estimate", "lower", "upper")]
+    table = Table("Free swing, 95 % intervals", (Column("number"), *columns, UNIT))
+    rows = (
+        ("damping ratio", free_swing.damping, "%", 100.0),
+        ("drag", free_swing.drag, "1/m", 1.0),
+        ("rope", free_swing.rope, "m", 1.0),
+    )
+    for name, number, unit, factor in rows:
+        interval = [None if end is None else factor * end for end in number.interval]
+        value = 0.0 if number.status == "at its lower bound" else number.value
+        table.add(name, factor * value, *interval, unit=unit)
     show(table)
     for sentence in free_swing.sentences():
         say(sentence)

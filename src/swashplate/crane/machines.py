@@ -258,7 +258,7 @@ def body_numbers(
         geometry=crane.geometry,
         home=home,
         hanging=hanging,
-        start=Start(*offset, *velocity),
+        release=Start(*offset, *velocity),
         mass=float(load + suspension.hook),
         travel=Travel(shortest, longest, sin(lowest), sin(highest)),
     )

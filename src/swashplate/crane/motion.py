@@ -67,10 +67,15 @@ class Body(NamedTuple):
     geometry: Geometry
     home: Home
     hanging: Hanging
-    start: Start
+    release: Start
     mass: Annotated[float, Definition("mass of load and hook", "kg", above=0.0)]
     travel: Travel
     ship: Ship = Ship()
+
+    @property
+    def start(self) -> Start:
+        """The same as `release`, for the closed loop."""
+        return self.release
 
 
 class BodyInputs(NamedTuple):
@@ -233,7 +238,7 @@ def body_sample(state: BodyState, inputs: BodyInputs, p: Body, h: float) -> Body
         UpperEnd(state.last_tip, state.last_rope),
         UpperEnd(tip, rope),
         state.samples,
-        p.start,
+        p.release,
         p.hanging,
         h,
     )

@@ -478,7 +478,12 @@ def _fastest_sine(tested: Mapping[str, Experiment]) -> float:
 
 
 def _validity(fit: Optimum, tested: Mapping[str, Experiment]) -> str:
-    """Sentence on the maneuvers that the fit holds for, and on limits never reached or modelled."""
+    """Sentence on the maneuvers that the fit holds for, and on limits never reached or modelled.
+
+    Empty if nothing was commanded in any run.
+    """
+    if all(run.input.kind == "none" for run in tested.values()):
+        return ""
     sentence = f"Holds for {maneuvers_tested(tested)}"
     if not isinstance(fit.problem.model, DriveModel):
         return f"{sentence}."

@@ -5,6 +5,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from math import isfinite
 from types import MappingProxyType
 from typing import Any, NamedTuple, TypeVar, cast
 
@@ -12,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swashplate.campaign import Channel, Experiment
-from swashplate.errors import DomainError, InputError, ParameterError, UnknownParameterError
+from swashplate.errors import DomainError, InputError, ParameterError, UnknownParameterError, meant
 from swashplate.identification.estimation.model import EquationModel, SimulationRequest
 from swashplate.machine import BlackBox, Machine, Ports
 from swashplate.machine import Model as Equations
@@ -38,9 +39,11 @@ class InputsOfRun(NamedTuple):
     """Inputs of a machine in an experiment."""
 
     driven: str
-    """The one that the experiment's input is."""
+    """The one that the experiment's input is; of an experiment without an input one that stays."""
     others: Mapping[str, Channel]
-    """Channels that the others are, by the inputs' names."""
+    """Channels that others are, by the inputs' names."""
+    constants: Mapping[str, float]
+    """What those stay at that are neither."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,6 +60,8 @@ class MeasuredMachine(Result, ABC):
     """Its parameters, which hold unless a fit says otherwise; none of a model without numbers."""
     rate: float | None
     """Samples a second; by default the input's. [Hz]"""
+    inputs: Mapping[str, float]
+    """What an input stays at in runs without a channel of it."""
 
     @property
     @abstractmethod
@@ -112,15 +117,19 @@ class MeasuredMachine(Result, ABC):
         ports = self.ports
         full = {full_name(name, ports.external): each for name, each in experiment.channels.items()}
         others = {name: full[name] for name in ports.external if name in full}
-        inputs = [name for name in ports.external if name not in full]
+        constants = {name: value for name, value in self.inputs.items() if name not in others}
+        inputs = [name for name in ports.external if name not in full | constants]
         inputs = [name for name in inputs if name not in ports.input_parameters] or inputs
-        if len(inputs) != 1:
+        if not inputs and constants and experiment.input.kind == "none":
+            return InputsOfRun(next(iter(constants)), others, constants)
+        if len(inputs) != 1 or experiment.input.kind == "none":
             raise InputError(
                 f"{ports.name} needs the signals {', '.join(ports.external)}; {experiment.name} "
-                "has one input, for one of them, and the channels "
-                f"{', '.join(experiment.channels)}."
+                f"has {'no' if experiment.input.kind == 'none' else 'one'} input, for one of them, "
+                f"and the channels {', '.join(experiment.channels)}; inputs = {{NAME: VALUE}} "
+                "beside the machine states those that stay at a value."
             )
-        return InputsOfRun(inputs[0], others)
+        return InputsOfRun(inputs[0], others, constants)
 
     def record_of(
         self, experiment: Experiment, driven: str, rate: float, substeps: int | None = None
@@ -195,7 +204,7 @@ class MeasuredEquations(MeasuredMachine, EquationModel):
         Refused if stamps are uneven and no rate is given.
         """
         del values
-        driven, others = self.inputs_of(experiment)
+        driven, others, constants = self.inputs_of(experiment)
         rate = self.rate or even_rate(experiment.input.time)
         if rate is None:
             raise InputError(
@@ -204,7 +213,12 @@ class MeasuredEquations(MeasuredMachine, EquationModel):
             )
         substeps = substeps_of(self.model, rate, self.substeps)
         record = self.record_of(experiment, driven, rate, substeps)
-        return driven, record, {name: each.at(record.points) for name, each in others.items()}
+        external = {name: each.at(record.points) for name, each in others.items()}
+        for name, value in constants.items():
+            external[name] = np.full(record.points.size, value)
+        if driven in external:
+            record = replace(record, values=external.pop(driven))
+        return driven, record, external
 
     def ready(
         self, values: Mapping[str, float], experiment: Experiment, request: SimulationRequest
@@ -282,12 +296,13 @@ class MeasuredBlackBox(MeasuredMachine):
 
     def simulate(self, values: Mapping[str, float], experiment: Experiment) -> Mapping[str, Array]:
         """Simulate the measured channels; see `MachineModel`."""
-        driven, others = self.inputs_of(experiment)
+        driven, others, constants = self.inputs_of(experiment)
         time, command = experiment.input.time, experiment.input.values
         if self.rate is not None:
             record = self.record_of(experiment, driven, self.rate)
             time, command = record.points, record.values
         inputs = {driven: command, **{name: each.at(time) for name, each in others.items()}}
+        inputs |= {name: np.full(time.size, value) for name, value in constants.items()}
         outputs = _replaced(self.machine, self.numbers, values).outputs(time, inputs)
         return {
             name: np.interp(experiment[name].time, time, outputs[signal])
@@ -311,6 +326,7 @@ def measured(
     *,
     rate: float | None = None,
     substeps: int | None = None,
+    inputs: Mapping[str, float] | None = None,
     begin: Mapping[str, str] | None = None,
     given: Any = None,
 ) -> MeasuredEquations | MeasuredBlackBox:
@@ -323,10 +339,11 @@ def measured(
     """
     if rate is not None and not (is_real(rate) and 0.0 < rate < np.inf):
         raise InputError(f"rate is {rate!r}, but must be a number of samples a second, above 0.")
-    begin = begin or {}
+    begin, inputs = begin or {}, inputs or {}
     check_mapping("begin", begin)
+    stays = _constants(model, inputs)
     if isinstance(model, Equations):
-        return MeasuredEquations(model, {}, rate, model, None, substeps, begin, given)
+        return MeasuredEquations(model, {}, rate, stays, model, None, substeps, begin, given)
     if isinstance(model, BlackBox):
         stated = {"substeps": substeps, "begin": begin, "given": given}
         for word, entry in stated.items():
@@ -334,14 +351,32 @@ def measured(
                 raise InputError(
                     f"{model.name} is a black box, which knows of no {word}: leave it out."
                 )
-        return MeasuredBlackBox(model.ports, model.numbers, rate, model)
+        return MeasuredBlackBox(model.ports, model.numbers, rate, stays, model)
     if isinstance(model, Machine):
         equations, numbers = model.model, model.numbers
-        return MeasuredEquations(equations, numbers, rate, equations, model, substeps, begin, given)
+        return MeasuredEquations(
+            equations, numbers, rate, stays, equations, model, substeps, begin, given
+        )
     raise InputError(
         f"A {type(model).__name__} is not a machine: give a Machine, a Model of equations, or of "
         "a program of your own a BlackBox."
     )
+
+
+def _constants(model: Any, inputs: Mapping[str, float]) -> Mapping[str, float]:
+    """Values of inputs by their full names; one that the machine does not have is refused."""
+    check_mapping("inputs", inputs)
+    external = getattr(getattr(model, "ports", model), "external", ())
+    constants = {full_name(name, external): value for name, value in inputs.items()}
+    for name, value in constants.items():
+        if name not in external:
+            raise InputError(
+                f"inputs names '{name}'{meant(name, external)}, but the inputs of {model.name} are "
+                f"{', '.join(external)}."
+            )
+        if not (is_real(value) and isfinite(value)):
+            raise InputError(f"The input {name} stays at {value!r}, but must be a finite number.")
+    return constants
 
 
 def states_started_by(model: Equations, name: str) -> list[str]:

@@ -69,6 +69,8 @@ BESIDE = (
     "standard_uncertainty",
     "rate",
     "substeps",
+    "inputs",
+    "each_run",
     "begin",
     "given",
 )
@@ -119,6 +121,10 @@ class ModelSetup(Result):
     """Samples a second; by default the input's. Needed if its stamps are not even. [Hz]"""
     substeps: int | None = None
     """Steps of the equations a sample; by default one, or so many as the longest step demands."""
+    inputs: Mapping[str, float] = field(default_factory=dict)
+    """What an input stays at in runs without a channel of its name. [unit]"""
+    each_run: tuple[str, ...] = ()
+    """What is free in each run by itself, besides beginnings of states and zeros of sensors."""
     begin: Mapping[str, str] = field(default_factory=dict)
     """Channel that says where a number of the state begins, by its path: at the first sample that
     counts."""
@@ -132,8 +138,9 @@ class ModelSetup(Result):
     def __post_init__(self) -> None:
         for table in ("free", "noise", "fixed", "standard_uncertainty"):
             check_mapping(table, getattr(self, table))
-        if isinstance(self.channels, str):
-            raise InputError(f"Give the channels as ('{self.channels}',).")
+        for table in ("channels", "each_run"):
+            if isinstance(getattr(self, table), str):
+                raise InputError(f"Give {table} as ('{getattr(self, table)}',).")
         machine = self.measured
         name = self.name or machine.name.lower()
         for table in ("free", "fixed", "standard_uncertainty"):
@@ -149,8 +156,12 @@ class ModelSetup(Result):
         _check_names(machine, "free", targets)
         _check_names(machine, "fixed", self.fixed)
         _check_ranges(name, machine, free, self.fixed)
+        object.__setattr__(self, "each_run", tuple(_full(key, machine) for key in self.each_run))
         object.__setattr__(self, "name", name)
         object.__setattr__(self, "free", free)
+        not_free = [key for key in self.each_run if key not in free]
+        if not_free:
+            raise InputError(f"{not_free[0]} of {name} is in each_run, but is not free.")
         without_value = [key for key in self.standard_uncertainty if key not in self.held]
         if without_value:
             raise InputError(
@@ -166,6 +177,7 @@ class ModelSetup(Result):
             self.model,
             rate=self.rate,
             substeps=self.substeps,
+            inputs=self.inputs,
             begin=self.begin,
             given=self.given,
         )
@@ -320,7 +332,7 @@ class ModelSetup(Result):
             channel = channels.get(unknown.name)
             if channel:
                 unknowns.append(replace(unknown, run=run, kind="zero", channel=channel))
-            elif self.measured.starts(unknown.name):
+            elif unknown.name in self.each_run or self.measured.starts(unknown.name):
                 unknowns.append(replace(unknown, run=run, kind="start"))
         return tuple(unknowns)
 

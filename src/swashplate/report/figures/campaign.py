@@ -109,6 +109,10 @@ def _scale_values(signal: InputSignal | Channel) -> Array:
     return signal.values if used is None else signal.values[_scale_rows(used)]
 
 
+OF_LOADS = ("swing_angle", "hook_position")
+"""Kinds of channel of which an axis has several, told apart by their names."""
+
+
 def _column(key: tuple[str, str], signals: Sequence[InputSignal | Channel]) -> PanelColumn:
     """Column of the signals of one name and unit of all runs, with their common scale."""
     # ignored samples may leave the panel: one spike would flatten all runs
@@ -116,13 +120,14 @@ def _column(key: tuple[str, str], signals: Sequence[InputSignal | Channel]) -> P
     low = min(float(values.min()) for values in values_of_runs)
     high = max(float(values.max()) for values in values_of_runs)
     kind = signals[0].kind
-    _, si = key
+    name, si = key
     unit = display_unit(si, max(abs(low), abs(high)))
     free = kind in ("position", "encoder_counts")
     if free:
         high = 0.5 * max(float(np.ptp(values)) for values in values_of_runs)
         low = -high
     special_names = {"encoder_counts": "encoder's angle", "other": signals[0].source.column}
+    special_names |= dict.fromkeys(OF_LOADS, name)
     label = unit.label(special_names.get(kind, kind.replace("_", " ")))
     return PanelColumn(key, label, unit, unit.factor * low, unit.factor * high, free)
 
@@ -639,7 +644,7 @@ def _overlay(quality: RunQuality, rows: slice) -> Overlay:
     """Measured curve of a channel, and the simulated one on top of it."""
     channel = quality.experiment[quality.channel]
     label = channel.kind.replace("_", " ").replace("encoder counts", "angle")
-    if channel.kind == "other":
+    if channel.kind in ("other", *OF_LOADS):
         label = channel.name
     curves = [(channel.values[rows], BLUE), (quality.simulated[rows], VERMILION)]
     return Overlay(label, channel.shown_unit, curves)
