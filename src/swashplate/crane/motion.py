@@ -72,11 +72,6 @@ class Body(NamedTuple):
     travel: Travel
     ship: Ship = Ship()
 
-    @property
-    def start(self) -> Start:
-        """The same as `release`, for the closed loop."""
-        return self.release
-
 
 class BodyInputs(NamedTuple):
     """Speeds of the shafts, positive hoists, slews to starboard, lifts; motion of the ship."""

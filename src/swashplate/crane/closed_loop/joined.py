@@ -224,7 +224,7 @@ class _Parts:
 
 def _first(numbers: Body, *, loaded: bool) -> seeing.First:
     """Crane and load before the first sample: the ship at rest, the load at its offset."""
-    g, home, start = numbers.geometry, numbers.home, numbers.start
+    g, home, start = numbers.geometry, numbers.home, numbers.release
     boom = boom_at(0.0, g, home)
     tip = tip_of(home.slew, boom, g)
     rope = float(rope_length(Shafts(0.0, 0.0, 0.0), g, home))

@@ -68,6 +68,7 @@ class ObservedMarch:
     ) -> None:
         self._model, self._columns, self._start = model, columns, start
         self._spare: deque[tuple[Array, ...]] = deque(maxlen=8)
+        self._refuse_before()
         self._start_code = start_code_of(model, form, outputs, start)
         begins: dict[SignalId, list[int]] = {}
         for number, column in enumerate(columns):
@@ -95,6 +96,17 @@ class ObservedMarch:
             for text in self.tangents.texts
         ]
         self.codes = np.array([code.address for code in self._codes], dtype=np.int64)
+
+    def _refuse_before(self) -> None:
+        """Refuse columns that are what signals were before the record."""
+        for index, part in enumerate(self._model.parts):
+            for tap in part.taps.values():
+                path = f"{self._model.prefix(index)}{tap.before}"
+                if tap.before and path in self._columns:
+                    raise InputError(
+                        f"{path} is what a signal was before the record: there are no derivatives "
+                        "by it."
+                    )
 
     def _set_states(self, states: Sequence[SignalId]) -> None:
         """Find out which states the columns move where a record begins."""

@@ -275,10 +275,10 @@ class Lanes:
         for tap in self._taps:
             delay = tap.tap.delay
             path = f"{self._model.prefix(tap.part)}{delay}"
-            late = numbers[path] / h if delay else np.zeros(LANES)
-            end = np.maximum(late, tap.tap.ahead) - tap.tap.ahead
-            samples[tap.number] = np.floor(end)
-            fraction[tap.number] = end - samples[tap.number]
+            steps = numbers[path] / h if delay else np.zeros(LANES)
+            end = np.maximum(steps, tap.tap.ahead) - tap.tap.ahead
+            samples[tap.number] = np.floor(end) + tap.tap.late
+            fraction[tap.number] = end - np.floor(end)
         return samples, fraction
 
     @property
@@ -318,11 +318,15 @@ class Lanes:
         x = SimpleNamespace(**dict(zip(names, others, strict=True)))
         march = InterpretedMarch(self._interpreted, {self._signal: 0}, {})
         before = np.zeros(len(x.records))
+        befores = [tap for tap in self._taps if tap.tap.before]
         between = len(signals_between(self._model))
         records = (*x.records[: len(x.records) - between], *np.empty((between, count)))
         for lane in range(LANES):
             row, margin, state = np.empty(count), np.array([np.inf, 0.0]), x.states[:, lane].copy()
             numbers = (x.delay_samples, x.delay_fraction, x.params, x.given)
+            for tap in befores:
+                place = self._model.places("parameters").index((tap.part, tap.tap.before))
+                before[len(before) - between + tap.between] = x.params[place, lane]
             of_lane = (each[:, lane] for each in numbers)
             march(count, 0, h, records, before, *of_lane, state, margin, row)
             x.states[:, lane], x.worst[lane] = state, margin[0]

@@ -211,6 +211,10 @@ class March:
         before = ZERO
         if not code.wide:
             before = code.load("%before", number, "double")
+        elif tap.tap.before:  # of each lane its own
+            path = tap.part, tap.tap.before
+            parameter = self.sample_code.model.places("parameters").index(path)
+            before = code.load("%params", parameter * self._lanes + lane, "double")
         return code.put(f"select i1 {inside}, double {value}, double {before}")
 
     def _take_in(self, margin: str) -> None:

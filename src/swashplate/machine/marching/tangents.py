@@ -137,11 +137,6 @@ class Carried:
                 if f"{prefix}{path}" in number_of:
                     column_of[node] = number_of[f"{prefix}{path}"]
             for tap in part.taps:
-                if f"{prefix}{tap.tap.before}" in number_of and tap.tap.before:
-                    raise InputError(
-                        f"{prefix}{tap.tap.before} is what a signal was before the record: there "
-                        "are no derivatives by it."
-                    )
                 if f"{prefix}{tap.tap.delay}" in number_of:
                     fraction = graph.name(part.delay_fraction(tap))
                     column_of[fraction] = number_of[f"{prefix}{tap.tap.delay}"]
