@@ -123,6 +123,6 @@ def _provenance(seed: int) -> tuple[tuple[str, str], ...]:
             )
         )
     rows.append(("virtual tests", f"instruments {SEVERITY}, seed {seed}"))
-    packages = ", ".join(f"{name} {version(name)}" for name in ("numpy", "numba", "scipy"))
+    packages = ", ".join(f"{name} {version(name)}" for name in ("numpy", "llvmlite", "scipy"))
     rows.append(("versions", f"swashplate {__version__}, Python {python_version()}, {packages}"))
     return tuple(rows)

@@ -45,7 +45,7 @@ TEST_TOOLS = (
     "sympy",
     "wasmtime",
 )
-SHOWN = ("numpy", "scipy", "numba", "pint", "rich")
+SHOWN = ("numpy", "scipy", "llvmlite", "pint", "rich")
 """Libraries whose versions the table gives."""
 
 
@@ -324,7 +324,7 @@ def table() -> Iterator[str]:
     occasions = sorted({f"{results['processor']}, {results['date']}" for results in tried})
     yield f"Linux, {'; '.join(occasions) or 'not yet'}:"
     yield ""
-    heads = ["Python", "versions", "NumPy", "SciPy", "Numba", "Pint", "Rich"]
+    heads = ["Python", "versions", "NumPy", "SciPy", "llvmlite", "Pint", "Rich"]
     heads += [check.name for check in CHECKS]
     yield f"| {' | '.join(heads)} |"
     yield "|" + "---|" * len(heads)

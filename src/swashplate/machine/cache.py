@@ -19,7 +19,7 @@ UNCACHED = (
     "SWASHPLATE_CACHE_DIR to a writable folder."
 )
 OPEN = (
-    "swashplate's compiled code are not read from {folder}, as {why}: what it holds is run. "
+    "swashplate's compiled code is not read from {folder}, as {why}: what it holds is run. "
     "Remove it, or set SWASHPLATE_CACHE_DIR to a folder that only you can write to."
 )
 COMPILING = "Compiling equations, once on this machine"
