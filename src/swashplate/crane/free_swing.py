@@ -53,7 +53,7 @@ class FreeSwing(NamedTuple):
     damping: Estimate
     """Damping ratio ζ of what resists in proportion to the speed. [1]"""
     drag: Estimate
-    """k of what resists with the square of the speed, k |v| v; C_d A is 2 k m/ρ. [1/m]"""
+    """k of what resists with the square of the speed, k v²; C_d A is 2 k m/ρ. [1/m]"""
     rope: Estimate
     """From the upper end to the load. [m]"""
     largest: float

@@ -372,7 +372,7 @@ def set_off(
 # --- path of a load -------------------------------------------------------------------------------
 
 
-class Path(NamedTuple):
+class LedLoad(NamedTuple):
     """Load and rope, and where they are at the first sample."""
 
     hanging: Hanging
@@ -390,7 +390,7 @@ class Led(NamedTuple):
 
 @equation
 def led_now(
-    state: Led, tip_x: float, tip_y: float, tip_z: float, rope: float, p: Path, h: float
+    state: Led, tip_x: float, tip_y: float, tip_z: float, rope: float, p: LedLoad, h: float
 ) -> Hung:
     """Load and hook at a sample; the first step is half a step from a given velocity."""
     hung = p.first
@@ -407,7 +407,7 @@ def led_step(state: Led, signals: Hung, tip_x: float, tip_y: float, tip_z: float
     return Led(min(state.samples + 1.0, 2.0), signals, Vector(tip_x, tip_y, tip_z))
 
 
-path = Model("path", parameters=Path, state=Led, step=led_step, sample=led_now)
+load_on_path = Model("load_on_path", parameters=LedLoad, state=Led, step=led_step, sample=led_now)
 
 
 class LoadMotion(NamedTuple):
@@ -503,7 +503,7 @@ def load_motion(
             pull=float(elastic_pull(stretch, stretch, float(rope[0]), s, h)),
             stretch=stretch,
         )
-    out = _led(Path(s, now), tips, rope, rate)
+    out = _led(LedLoad(s, now), tips, rope, rate)
     failed = int(np.argmax(out[6] < 0.0))
     if out[6, failed] < 0.0:
         raise InputError(too_fast_sentence(float(rope[failed]), failed / rate, rate))
@@ -512,10 +512,10 @@ def load_motion(
     return LoadMotion(out[:3].T, out[6], out[3:6].T if s.sling > 0.0 else None)
 
 
-def _led(numbers: Path, tips: Array, rope: Array, rate: float) -> Array:
+def _led(numbers: LedLoad, tips: Array, rope: Array, rate: float) -> Array:
     """(7, n) load, hook and pull of a load that is led along a path."""
     inputs = {f"tip_{axis}": tips[:, i] for i, axis in enumerate("xyz")}
-    run = simulate(Machine(path, numbers), inputs | {"rope": rope}, rate)
+    run = simulate(Machine(load_on_path, numbers), inputs | {"rope": rope}, rate)
     names = [f"{point}.{axis}" for point in ("load", "hook") for axis in "xyz"]
     return np.stack([run[name] for name in (*names, "pull")])
 

@@ -40,7 +40,7 @@ NOISE = tuple(f"sensors.{name}" for name in seeing.Noise._fields)
 """Inputs with sensors."""
 
 
-class Loop(NamedTuple):
+class ControlLoop(NamedTuple):
     """What closes the loop around a crane."""
 
     settings: Settings
@@ -58,7 +58,7 @@ def elevation(boom_sin: float, boom_cos: float) -> float:
     return atan2(boom_sin, boom_cos)
 
 
-def closed_loop(crane: Crane, numbers: Body, loop: Loop) -> Machine:
+def closed_loop(crane: Crane, numbers: Body, loop: ControlLoop) -> Machine:
     """A crane under control as a machine.
 
     Its inputs are `STICK`, or `VOLTAGES` with direct actuation, the ship's motion `SHIP`, which may
@@ -81,7 +81,7 @@ def closed_loop(crane: Crane, numbers: Body, loop: Loop) -> Machine:
 class _Parts:
     """Members of a crane under control, and their links, in the order of the flow."""
 
-    def __init__(self, crane: Crane, numbers: Body, loop: Loop) -> None:
+    def __init__(self, crane: Crane, numbers: Body, loop: ControlLoop) -> None:
         self.crane, self.numbers, self.loop = crane, numbers, loop
         self.members: dict[str, Machine] = {}
         self.links: dict[str, Any] = {}

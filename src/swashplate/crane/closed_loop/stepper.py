@@ -16,7 +16,7 @@ from swashplate.crane.closed_loop.joined import (
     SHIP,
     STICK,
     VOLTAGES,
-    Loop,
+    ControlLoop,
     closed_loop,
 )
 from swashplate.crane.closed_loop.signals import (
@@ -202,19 +202,30 @@ class CraneStepper:
         if self._stepped is None:
             self._stepped = self._start()
         step, context, advance, noise = self._stepped
-        sensing = self.fixed.settings.sensing
-        table = np.empty((len(self._outputs), len(commands)))
-        for n, command in enumerate(commands):
-            context.inputs[:3] = command
-            context.inputs[3:9] = ship[n] if ship.shape[1] > 1 else 0.0
-            if sensing is not None and _measures(self._samples, sensing.rate):
-                context.inputs[9:] = noise.standard_normal(len(NOISE))
+        given = self._given_by(commands, ship, noise)
+        table, margins = np.empty((len(commands), len(self._outputs))), np.empty(len(commands))
+        inputs, outputs, margin = context.inputs, context.outputs, context.margin
+        for n, row in enumerate(given):
+            inputs[:] = row
             advance()
-            table[:, n] = context.outputs
-            self._refuse(table[:, n : n + 1], self._samples)
-            step.check(context, float(context.margin[0]), "command")
-            self._samples += 1
+            table[n] = outputs
+            margins[n] = margin[0]
+        self._refuse(table.T, self._samples)
+        step.check(context, float(margins.min()), "command")
+        self._samples += len(commands)
+        table = table.T
         return Signals(self._stored(table, commands), self.fixed.columns).table()
+
+    def _given_by(self, commands: Array, ship: Array, noise: np.random.Generator) -> Array:
+        """(n, inputs) what the compiled step is given: commands, ship, noise of the sensors."""
+        sensing = self.fixed.settings.sensing
+        columns = [commands, np.broadcast_to(ship, (len(commands), len(SHIP)))]
+        if sensing is not None:
+            measures = _measures(self._samples + np.arange(len(commands)), sensing.rate)
+            drawn = np.zeros((len(commands), len(NOISE)))
+            drawn[measures] = noise.standard_normal((measures.sum(), len(NOISE)))
+            columns.append(drawn)
+        return np.concatenate(columns, axis=1)
 
     def run(self, commands: Array, ship: Array) -> Array:
         """March a complete run and return its stored signals, by `Fixed.columns`."""
@@ -236,19 +247,16 @@ class CraneStepper:
         return _Stepped(step, context, bound_step(context), np.random.default_rng(self._seed))
 
     def _inputs(self, commands: Array, ship: Array) -> dict[str, Array]:
-        """What the machine of a complete run is given."""
-        names = VOLTAGES if self._direct else STICK
-        inputs = {name: np.ascontiguousarray(commands[:, i]) for i, name in enumerate(names)}
-        if ship.shape[1] > 1:
-            inputs |= {name: np.ascontiguousarray(ship[:, i]) for i, name in enumerate(SHIP)}
-        sensing = self.fixed.settings.sensing
-        if sensing is not None:
-            measures = _measures(np.arange(len(commands)), sensing.rate)
-            noise = np.zeros((len(commands), len(NOISE)))
-            drawn = np.random.default_rng(self._seed).standard_normal((measures.sum(), len(NOISE)))
-            noise[measures] = drawn
-            inputs |= {name: np.ascontiguousarray(noise[:, i]) for i, name in enumerate(NOISE)}
-        return inputs
+        """What the machine of a complete run is given; a ship at rest is left out."""
+        names = [*(VOLTAGES if self._direct else STICK), *SHIP, *NOISE]
+        given = self._given_by(commands, ship, np.random.default_rng(self._seed))
+        moves = ship.shape[1] > 1
+        columns = zip(names, given.T, strict=False)
+        return {
+            name: np.ascontiguousarray(column)
+            for name, column in columns
+            if moves or name not in SHIP
+        }
 
     def _stored(self, table: Array, commands: Array) -> Array:
         """What is stored of a run, by `Fixed.columns`, of the machine's outputs, a row each."""
@@ -324,7 +332,7 @@ def _prepared(crane: Crane, options: tuple[tuple[str, Any], ...]) -> _Prepared:
     numbers, fixed = _fixed(crane, settings, **keywords)
     if fixed.actuation == "direct" and control is not None:
         raise InputError("With direct actuation the voltages are given: leave control out.")
-    loop = Loop(settings, controller, fixed.actuation, fixed.loaded, brake)
+    loop = ControlLoop(settings, controller, fixed.actuation, fixed.loaded, brake)
     machine = closed_loop(crane, numbers, loop)
     return _Prepared(
         fixed=fixed,
@@ -342,7 +350,7 @@ def _measures(samples: Any, rate: float) -> Any:
     return (samples == 0) | (np.maximum(now, 0.0) > np.maximum(before, 0.0))
 
 
-def _outputs(fixed: Fixed, loop: Loop) -> list[str]:
+def _outputs(fixed: Fixed, loop: ControlLoop) -> list[str]:
     """Signals of the joined machine in the order of `Fixed.columns`, then the controller's."""
     speeds = [f"{axis}.{SPEED}" for axis in AXES]
     ideal = fixed.actuation == "ideal"

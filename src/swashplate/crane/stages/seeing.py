@@ -13,14 +13,14 @@ ROUNDING = 1e-9
 """By which a measurement may come before its sample."""
 
 
-class Nothing(NamedTuple):
+class Stateless(NamedTuple):
     """State of what remembers nothing."""
 
 
 @equation
-def nothing() -> Nothing:
+def stateless() -> Stateless:
     """Remember nothing."""
-    return Nothing()
+    return Stateless()
 
 
 # --- the sample before ----------------------------------------------------------------------------
@@ -160,8 +160,8 @@ def seen_now(inputs: LastSample, p: First) -> View:
 view = Model(
     "view",
     parameters=First,
-    state=Nothing,
-    step=nothing,
+    state=Stateless,
+    step=stateless,
     sample=seen_now,
     inputs=LastSample,
     defaults=SHIP,
@@ -236,7 +236,7 @@ def sensed(inputs: Sensed, p: Sensing) -> Seen:
 
 
 sensors = Model(
-    "sensors", parameters=Sensing, state=Nothing, step=nothing, sample=sensed, inputs=Sensed
+    "sensors", parameters=Sensing, state=Stateless, step=stateless, sample=sensed, inputs=Sensed
 )
 
 

@@ -29,7 +29,7 @@ from swashplate.crane.kinematics import (
 )
 from swashplate.crane.motion import SHIP, Ship
 from swashplate.crane.rope import GRAVITY
-from swashplate.crane.stages.seeing import Nothing, nothing
+from swashplate.crane.stages.seeing import Stateless, stateless
 from swashplate.machine import History, Model, Tap, equation, interpolate, past
 from swashplate.parameters import FULL_VOLTAGE
 
@@ -78,7 +78,7 @@ def asked(hoist: float, slew: float, luff: float, p: Drives) -> Reference:
     return Reference(full_speed(hoist, p.hoist), full_speed(slew, p.slew), full_speed(luff, p.luff))
 
 
-stick = Model("stick", parameters=Drives, state=Nothing, step=nothing, sample=asked)
+stick = Model("stick", parameters=Drives, state=Stateless, step=stateless, sample=asked)
 
 
 class Path(NamedTuple):
@@ -181,8 +181,8 @@ def shaped_path(ahead_x: History, ahead_y: History, rope: float, p: Impulses, h:
 shaper = Model(
     "shaper",
     parameters=Impulses,
-    state=Nothing,
-    step=nothing,
+    state=Stateless,
+    step=stateless,
     sample=shaped_path,
     taps={
         "ahead_x": Tap("ahead_x", longest="longest", before="begin_x"),
@@ -259,8 +259,8 @@ def offsets(inputs: FeedbackInputs, p: Offsets, h: float) -> Offset:
 feedback = Model(
     "feedback",
     parameters=Offsets,
-    state=Nothing,
-    step=nothing,
+    state=Stateless,
+    step=stateless,
     sample=offsets,
     inputs=FeedbackInputs,
     taps={
@@ -388,21 +388,21 @@ follower = Model(
 # --- actuation ------------------------------------------------------------------------------------
 
 
-class Command(NamedTuple):
+class DriveCommand(NamedTuple):
     """Of a drive. [V]"""
 
     command: float
 
 
 @equation
-def straight_command(reference: float, p: Drivable) -> Command:
+def straight_command(reference: float, p: Drivable) -> DriveCommand:
     """10 V for full speed, clipped."""
     full = p.high if reference > 0.0 else -p.low
-    return Command(min(max(FULL_VOLTAGE * reference / full, -FULL_VOLTAGE), FULL_VOLTAGE))
+    return DriveCommand(min(max(FULL_VOLTAGE * reference / full, -FULL_VOLTAGE), FULL_VOLTAGE))
 
 
 straight = Model(
-    "straight", parameters=Drivable, state=Nothing, step=nothing, sample=straight_command
+    "straight", parameters=Drivable, state=Stateless, step=stateless, sample=straight_command
 )
 
 
@@ -418,7 +418,7 @@ def ideal_speed(reference: float, p: Drivable) -> Shaft:
     return Shaft(min(max(reference, p.low), p.high))
 
 
-ideal = Model("ideal", parameters=Drivable, state=Nothing, step=nothing, sample=ideal_speed)
+ideal = Model("ideal", parameters=Drivable, state=Stateless, step=stateless, sample=ideal_speed)
 
 
 Table: Any = NamedTuple("Table", [(f"at_{number}", float) for number in range(POINTS)])  # type: ignore[misc]
@@ -445,15 +445,17 @@ class Inverse(NamedTuple):
 
 
 @equation
-def inverse_command(reference: float, p: Inverse) -> Command:
-    """Command of a drive for a speed of its shaft, by `InverseMap.voltage`, clipped."""
+def inverse_command(reference: float, p: Inverse) -> DriveCommand:
+    """DriveCommand of a drive for a speed of its shaft, by `InverseMap.voltage`, clipped."""
     below = reference - p.slowest_down
     above = p.slowest_up - reference
     at_rest = abs(reference - p.creep)
     edge = p.edge_down if below <= above else p.edge_up
     still = 0.0 if at_rest <= below and at_rest <= above else edge
     moving = interpolate(min(max(reference, p.low), p.high), p.speed, p.voltage)
-    return Command(still if below >= 0.0 and above >= 0.0 else moving)
+    return DriveCommand(still if below >= 0.0 and above >= 0.0 else moving)
 
 
-inverse = Model("inverse", parameters=Inverse, state=Nothing, step=nothing, sample=inverse_command)
+inverse = Model(
+    "inverse", parameters=Inverse, state=Stateless, step=stateless, sample=inverse_command
+)

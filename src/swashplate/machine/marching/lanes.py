@@ -318,13 +318,13 @@ class Lanes:
         x = SimpleNamespace(**dict(zip(names, others, strict=True)))
         march = InterpretedMarch(self._interpreted, {self._signal: 0}, {})
         before = np.zeros(len(x.records))
-        befores = [tap for tap in self._taps if tap.tap.before]
+        with_before = [tap for tap in self._taps if tap.tap.before]
         between = len(signals_between(self._model))
         records = (*x.records[: len(x.records) - between], *np.empty((between, count)))
         for lane in range(LANES):
             row, margin, state = np.empty(count), np.array([np.inf, 0.0]), x.states[:, lane].copy()
             numbers = (x.delay_samples, x.delay_fraction, x.params, x.given)
-            for tap in befores:
+            for tap in with_before:
                 place = self._model.places("parameters").index((tap.part, tap.tap.before))
                 before[len(before) - between + tap.between] = x.params[place, lane]
             of_lane = (each[:, lane] for each in numbers)
