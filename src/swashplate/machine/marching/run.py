@@ -7,7 +7,6 @@ from collections.abc import Callable, Collection, Iterator, Mapping, Sequence, S
 from dataclasses import dataclass, field, fields
 from functools import cached_property, lru_cache
 from itertools import count
-from math import isclose
 from types import MappingProxyType
 from typing import Any, Literal, NamedTuple, TypeVar
 
@@ -63,6 +62,8 @@ T = TypeVar("T")
 
 MOST_PASSES = 200
 """Passes over the parts until what comes late of those behind has settled."""
+SETTLED = 1e-14
+"""Change over a pass, of the largest value, that counts as none."""
 MOST_CACHED = 128
 """Results that an instance keeps before it forgets all."""
 NO_NUMBER = (ValueError, ZeroDivisionError, OverflowError)
@@ -409,10 +410,12 @@ class Machine:
         late = self._before()
         if start == "rest":
             return self._pass(first, h, start, states_given, late)
+        largest = dict.fromkeys(late, 0.0)
         for _ in range(MOST_PASSES):
             initial = self._pass(first, h, start, states_given, late)
             settled = self._late(initial)
-            if all(isclose(settled[at], late[at], rel_tol=1e-14) for at in late):
+            largest = {at: max(largest[at], abs(settled[at])) for at in late}
+            if all(abs(settled[at] - late[at]) <= SETTLED * largest[at] for at in late):
                 return initial
             late = settled
         raise DomainError(
