@@ -372,6 +372,9 @@ def set_off(
 # --- path of a load -------------------------------------------------------------------------------
 
 
+ORIGIN = Vector(0.0, 0.0, 0.0)
+
+
 class LedLoad(NamedTuple):
     """Load and rope, and where they are at the first sample."""
 
@@ -384,8 +387,8 @@ class Led(NamedTuple):
 
     samples: float = 0.0
     """Samples so far, 2 if they are more: the first two are not like the others."""
-    hung: Hung = Hung(*(Vector(0.0, 0.0, 0.0),) * 4, 0.0, 0.0)
-    tip: Vector = Vector(0.0, 0.0, 0.0)
+    hung: Hung = Hung(ORIGIN, ORIGIN, ORIGIN, ORIGIN, 0.0, 0.0)
+    tip: Vector = ORIGIN
 
 
 @equation

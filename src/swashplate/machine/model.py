@@ -138,8 +138,11 @@ class Tap(NamedTuple):
     @property
     def samples(self) -> int:
         """Samples that are read."""
-        one = self.longest or self.hold == "none"
-        return self.width or (1 if one else 3 if self.hold == "mean" else 2)
+        if self.width:
+            return self.width
+        if self.longest or self.hold == "none":
+            return 1
+        return 3 if self.hold == "mean" else 2
 
 
 def type_of_input(tap: Tap) -> type[Any]:

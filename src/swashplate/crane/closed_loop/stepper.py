@@ -240,7 +240,7 @@ class CraneStepper:
 
     def _start(self) -> _Stepped:
         """The compiled step before its first sample."""
-        names = (*(VOLTAGES if self._direct else STICK), *SHIP)
+        names = VOLTAGES + SHIP if self._direct else STICK + SHIP
         names += NOISE if self.fixed.settings.sensing is not None else ()
         step = CompiledStep(self._machine, names, self._outputs, 1.0 / RATE)
         context = step.context()

@@ -421,6 +421,7 @@ def ideal_speed(reference: float, p: Drivable) -> Shaft:
 ideal = Model("ideal", parameters=Drivable, state=Stateless, step=stateless, sample=ideal_speed)
 
 
+# mypy knows only named tuples whose fields are written out
 Table: Any = NamedTuple("Table", [(f"at_{number}", float) for number in range(POINTS)])  # type: ignore[misc]
 """Numbers at all points of an inverse map."""
 
