@@ -37,11 +37,11 @@ demo: $(STAMP) ## identify a virtual hoist from its tests, with a report, into d
 
 test: lint ## lint, then the quick tests
 	@echo; echo "== Tests"
-	@$(BIN)/pytest -n 2 --dist loadgroup --durations=40 -m "not slow"
+	@$(BIN)/pytest -n 2 --durations=40 -m "not slow"
 
 test-slow: $(STAMP) ## the slow tests: pages, examples, reproduction, searches, without the JIT
 	@echo "== Slow tests"
-	@$(BIN)/pytest -n 2 --dist loadgroup --durations=40 -m slow
+	@$(BIN)/pytest -n 2 --durations=40 -m slow
 	@echo; echo "== Tests marked 'interpreted', without the JIT"
 	@SWASHPLATE_COMPILE=0 $(BIN)/pytest -n 2 -m interpreted
 # the one that differs most from what the tests before ran with
@@ -57,7 +57,7 @@ TESTS ?= tests
 test-kernels: $(STAMP) ## the quick tests with other kernels of the linear algebra, and compiled for any processor
 	@for kernel in $(KERNELS); do \
 	  echo; echo "== Linear algebra for $$kernel, compiled for any processor"; \
-	  OPENBLAS_CORETYPE=$$kernel SWASHPLATE_CPU=generic $(BIN)/pytest -n 2 --dist loadgroup -m "not slow" $(TESTS) || exit 1; \
+	  OPENBLAS_CORETYPE=$$kernel SWASHPLATE_CPU=generic $(BIN)/pytest -n 2 -m "not slow" $(TESTS) || exit 1; \
 	done
 
 lint: $(STAMP) ## style, format, types and the direction of imports

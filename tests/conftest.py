@@ -3,8 +3,10 @@
 import os
 import signal
 import tomllib
+from collections import Counter
 from collections.abc import Callable, Sequence
 from pathlib import Path
+from typing import Any
 
 import pytest
 from hypothesis import HealthCheck, settings
@@ -32,14 +34,48 @@ SLOW = {"docs", "examples", "reproduction"}
 
 CRANE_FILES = {"test_crane_pages.py", "test_earlier_files.py"}
 """Files of other folders that simulate a crane."""
-ALONE = {
+ALONE = (
     "test_benchmarks.py",
     "test_pages.py",
-    "test_recovery.py",
-    "test_scripts.py",
     "test_site.py",
-}
-"""Files whose slow tests have nothing in common that takes long to make."""
+    "test_scripts.py",
+    "test_recovery.py",
+)
+"""Files whose slow tests have nothing in common that takes long to make, the slowest first."""
+
+
+def group_of(test: str, *, slow: bool) -> str:
+    """What a test shares a worker with, by its name ``folder/file.py::name``.
+
+    Of what needs the same kernels none is compiled twice, and no fit that several tests look at is
+    made twice. `slow`: whether only slow tests run.
+    """
+    path = Path(test.partition("::")[0])
+    folder, file = path.parent.name, path.name
+    if slow and file in ALONE:
+        return test
+    if folder == "crane" or file in CRANE_FILES:
+        return "crane"
+    if folder in ("drive", "linear") or file == "test_stepping.py":
+        return "steppers"
+    return folder if folder == "reproduction" else file
+
+
+@pytest.hookimpl(optionalhook=True)
+def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> Any:
+    """Give each group to one worker.
+
+    Not by marks ``xdist_group``: they go by names that pytest 9.2 no longer lets xdist 3.8 change,
+    so that they are ignored without a word.
+    """
+    from xdist.scheduler import LoadScopeScheduling
+
+    class Groups(LoadScopeScheduling):
+        def _split_scope(self, nodeid: str) -> str:
+            return group_of(nodeid, slow=config.option.markexpr == "slow")
+
+    config.option.loadscopereorder = False
+    return Groups(config, log)
 
 
 def pytest_ignore_collect(collection_path: Path, config: pytest.Config) -> bool | None:
@@ -50,27 +86,25 @@ def pytest_ignore_collect(collection_path: Path, config: pytest.Config) -> bool 
     return None
 
 
-@pytest.hookimpl(tryfirst=True)  # before the groups are read
-def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Mark what lies in a slow folder as slow, and group what needs the same kernels.
+@pytest.hookimpl(tryfirst=True)  # before tests are left out by their marks
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+    """Mark what lies in a slow folder as slow, and begin with what takes longest.
 
-    With ``--dist loadgroup`` a group is one worker's, so that no kernel is compiled twice, and no
-    fit that several tests look at is made twice.
+    So no worker waits for it at the end.
     """
     for item in items:
-        folder, file = item.path.parent.name, item.path.name
-        if folder in SLOW:
+        if item.path.parent.name in SLOW:
             item.add_marker(pytest.mark.slow)
-        if file in ALONE and item.get_closest_marker("slow"):
-            continue
-        closes_loops = folder == "crane" or file in CRANE_FILES
-        steps = folder in ("drive", "linear") or file == "test_stepping.py"
-        group = "crane" if closes_loops else "steppers" if steps else file
-        if folder == "reproduction":
-            group = folder
-        item.add_marker(pytest.mark.xdist_group(group))
-    # the longest of those that are alone begin first: no worker waits for them at the end
-    items.sort(key=lambda item: item.path.name != "test_benchmarks.py")
+    slow = config.option.markexpr == "slow"
+    groups = {item: group_of(item.nodeid, slow=slow) for item in items}
+    sizes = Counter(groups.values())
+
+    def place(item: pytest.Item) -> tuple[int, int, str]:
+        file = item.path.name
+        first = ALONE.index(file) if slow and file in ALONE else len(ALONE)
+        return first, -sizes[groups[item]], groups[item]
+
+    items.sort(key=place)
 
 
 def richardson(function: Callable[..., float], at: Sequence[float], index: int, h: float) -> float:

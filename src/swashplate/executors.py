@@ -9,6 +9,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import partial
 from itertools import islice
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol
 
 from swashplate.errors import InputError, SwashplateError
@@ -36,7 +37,7 @@ class Executor(Protocol):
         function : callable
             Of a module, so that it can be sent to another process.
         shared :
-            Its first argument, the same for all items; sent once to each worker.
+            Its first argument, the same for all items; each worker gets it once.
         items : sequence
             Its second argument.
 
@@ -70,24 +71,49 @@ class Threads:
 
         workers = self.workers or available_cores()
         with ThreadPoolExecutor(workers) as pool:
-            yield from _completed(pool, partial(function, shared), items, workers)
+            try:
+                yield from _completed(pool, partial(function, shared), items, workers)
+            finally:
+                pool.shutdown(wait=False, cancel_futures=True)
+
+
+@contextmanager
+def _in_a_file(shared: Any) -> Iterator[Path]:
+    """Path of a file with what all workers share, which only this user can read.
+
+    What goes through the pipe of a worker's start beyond the 64 kB that a pipe holds keeps its
+    parent waiting until the worker has imported the main module. A parent that is ended meanwhile
+    leaves a worker that it does not know yet, with half of its data.
+    """
+    import pickle
+    from tempfile import mkstemp
+
+    handle, name = mkstemp(prefix="swashplate-")
+    path = Path(name)
+    with undone(path.unlink):
+        try:
+            with os.fdopen(handle, "wb") as file:
+                pickle.dump(shared, file, pickle.HIGHEST_PROTOCOL)
+            yield path
+        finally:
+            path.unlink()
 
 
 _shared: Any = None
 
 
-def _receive(shared: Any) -> None:
-    """Initialise a worker: keep what all items share, and end when its parent does, and only then.
+def _receive(path: Path) -> None:
+    """Initialise a worker: read what all items share, and end when its parent does, and only then.
 
     Ctrl-C reaches the workers as well as the parent, which ends them. A parent that is killed
     cannot end its workers, and what they hold of its pipes would keep whoever reads them waiting.
     """
+    import pickle
     from multiprocessing import parent_process
     from threading import Thread
 
     global _shared
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    _shared = shared
     parent = parent_process()
 
     def end_with_parent() -> None:
@@ -96,6 +122,11 @@ def _receive(shared: Any) -> None:
             os._exit(1)
 
     Thread(target=end_with_parent, daemon=True).start()
+    try:
+        data = path.read_bytes()
+    except FileNotFoundError:  # the parent has ended
+        os._exit(1)
+    _shared = pickle.loads(data)
 
 
 def _apply(function: Work, item: Any) -> Any:
@@ -127,9 +158,10 @@ class Processes:
 
         # spawned, not forked: a fork copies locks of NumPy's threads in any state
         with (
+            _in_a_file(shared) as path,
             undone(end_workers),
             ProcessPoolExecutor(
-                workers, get_context("spawn"), initializer=_receive, initargs=(shared,)
+                workers, get_context("spawn"), initializer=_receive, initargs=(path,)
             ) as pool,
         ):
             try:
@@ -140,6 +172,8 @@ class Processes:
                     "module, and guard the start of a script by if __name__ == '__main__'."
                 ) from None
             except BaseException:  # Ctrl-C, or whoever asked has had enough: nobody waits for them
+                # and nothing is cancelled, which Python's pool would complain of when it sees them
+                # killed
                 end_workers()
                 raise
 
@@ -168,20 +202,16 @@ def _completed(
 
     waiting = iter(enumerate(items))
     running: dict[Future[Any], int] = {}
-    try:
-        while True:
-            for k, item in islice(waiting, 2 * workers - len(running)):
-                # a worker that gets half of what it is to run says so
-                with as_a_whole(), _deaf_to_interrupts():
-                    running[pool.submit(function, item)] = k
-            if not running:
-                return
-            let_signals_end_waits()
-            for future in wait(running, return_when=FIRST_COMPLETED).done:
-                yield running.pop(future), future.result()
-    finally:
-        for future in running:
-            future.cancel()
+    while True:
+        for k, item in islice(waiting, 2 * workers - len(running)):
+            # a worker that is ended while it starts says so
+            with as_a_whole(), _deaf_to_interrupts():
+                running[pool.submit(function, item)] = k
+        if not running:
+            return
+        let_signals_end_waits()
+        for future in wait(running, return_when=FIRST_COMPLETED).done:
+            yield running.pop(future), future.result()
 
 
 @dataclass(frozen=True)
