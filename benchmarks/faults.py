@@ -128,10 +128,10 @@ def campaign(program, fault, axis, rate, seed, folder):
     return record
 
 
-def fault_items(faults, axes, campaigns, sound, first):
+def fault_items(faults, axes, campaigns, sound, first, rate=RATE):
     """Campaigns of faults from a first seed on; the first seeds of all faults first."""
     return [
-        {"fault": fault, "axis": axis, "rate": RATE, "seed": first + n}
+        {"fault": fault, "axis": axis, "rate": rate, "seed": first + n}
         for n in range(max(campaigns, sound))
         for fault in faults
         for axis in axes
@@ -391,6 +391,9 @@ def main():
     parser.add_argument("--sound", type=int, default=10, help="without a fault")
     parser.add_argument("--fewer", action="store_true", help="fewer instruments instead of faults")
     parser.add_argument(
+        "--rate", type=float, choices=FEWER_RATES, default=RATE, help="of the logger, with faults"
+    )
+    parser.add_argument(
         "--development", action="store_true", help="seeds that nothing is quoted of"
     )
     parser.add_argument("--python", default=sys.executable, help="executable with swashplate")
@@ -407,9 +410,16 @@ def main():
             items = fewer_items(arguments.axis, arguments.campaigns)
         else:
             seeds = draws.LEVELS["seeds"]
-            first = seeds["development_from"] if arguments.development else seeds["at_512"][0]
+            first = seeds[FEWER_RATES[arguments.rate]][0]
+            if arguments.development:
+                first = seeds["development_from"]
             items = fault_items(
-                arguments.fault, arguments.axis, arguments.campaigns, arguments.sound, first
+                arguments.fault,
+                arguments.axis,
+                arguments.campaigns,
+                arguments.sound,
+                first,
+                arguments.rate,
             )
         program = Program(arguments.python)
 

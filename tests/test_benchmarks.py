@@ -44,8 +44,8 @@ def test_calibration_goes_from_logs_to_tables_and_goes_on(tmp_path: Path) -> Non
             [
                 sys.executable,
                 str(BENCHMARKS / "calibration.py"),
-                *("--axis", "luff", "--campaigns", "1", "--development", "--jobs", "1"),
-                *("--out", "found.jsonl"),
+                *("--axis", "luff", "--rate", "50", "--campaigns", "1", "--development"),
+                *("--jobs", "1", "--out", "found.jsonl"),
             ],
             cwd=tmp_path,
             capture_output=True,
@@ -59,13 +59,13 @@ def test_calibration_goes_from_logs_to_tables_and_goes_on(tmp_path: Path) -> Non
     lines = (tmp_path / "found.jsonl").read_text("utf-8").splitlines()
     assert len(lines) == 1
     record = json.loads(lines[0])
-    assert (record["axis"], record["seed"], record["rate"]) == ("luff", 1000, 512.0)
+    assert (record["axis"], record["seed"], record["rate"]) == ("luff", 1000, 50.0)
     rows = {row["name"]: row for row in record["estimates"]}
     assert {"V_dz_plus", "omega_plus", "Z8", "Z19_minus"} <= set(rows)
     assert rows["Z8"]["value"] == pytest.approx(rows["Z8"]["truth"], rel=0.2)
     assert len(record["new"]) == 5
     assert max(record["new"].values()) < 5.0
-    assert "| luff | with | 30 % | 0 % | 512 | 1 (1000 to 1000) |" in first
+    assert "| luff | with | 30 % | 0 % | 50 | 1 (1000 to 1000) |" in first
     # ramps pass the dead zone; no test reaches the spool's stop
     assert rows["V_dz_plus"]["told"]
     assert not rows["Z14"]["told"]
@@ -315,8 +315,8 @@ def test_faults_go_from_logs_to_a_table(bench: ModuleType, tmp_path: Path) -> No
             sys.executable,
             str(BENCHMARKS / "faults.py"),
             *("--axis", "slew", "--fault", "none", "encoder reads 3 % too much"),
-            *("--campaigns", "1", "--sound", "1", "--development", "--jobs", "1"),
-            *("--out", "found.jsonl", "--judged", "judged.jsonl"),
+            *("--rate", "50", "--campaigns", "1", "--sound", "1", "--development"),
+            *("--jobs", "1", "--out", "found.jsonl", "--judged", "judged.jsonl"),
         ],
         cwd=tmp_path,
         capture_output=True,

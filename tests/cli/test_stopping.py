@@ -8,7 +8,7 @@ import time
 from pathlib import Path
 
 import pytest
-from tests.cli.conftest import STEPS, freeing, without_resource_warnings
+from tests.cli.conftest import freeing, without_resource_warnings
 from tests.marks import rest_slow
 
 from swashplate.stopping import GRACE
@@ -97,8 +97,8 @@ def check_stopped(words: list[str], cwd: Path, after: float, how: signal.Signals
 
 
 @pytest.fixture
-def virtual_tests(done, tmp_path: Path) -> Path:
-    done("rig", "hoist", "--out", "virtual", *STEPS)
+def virtual_tests(virtual: Path, tmp_path: Path) -> Path:
+    """A folder with the folder virtual and a fit setup."""
     (tmp_path / "setup.toml").write_text(SETUP, "utf-8")
     return tmp_path
 
