@@ -147,18 +147,8 @@ def identify(
     if starts is not None:
         folder = None if store is None else Path(store)
         search = Search(starts, seed, executor or Serial(), store=folder, resume=resume)
-    result = fit(
-        nominal,
-        runs,
-        setup,
-        loss=loss,
-        max_evaluations=max_evaluations,
-        search=search,
-    )
+    result = _fitted(nominal, runs, setup, loss, max_evaluations, search)
     _check_profiles(result, profiles)
-    if all(run.input.settled for run in runs):
-        doubts = doubt(result.runs, result.nominal, result.setup, loss=loss)
-        result = replace(result, doubts=(*result.doubts, *doubts))
     campaign = campaign.with_interpolation(axis, result.runs[0].input.interpolation)
     notes = {**versions(), "seed": str(seed), "campaign": str(campaign.path)}
     identification = Identification(campaign, result, notes=notes, required=required)
@@ -169,6 +159,22 @@ def identify(
         curves = list(profiles_of(result, names, executor=executor).values())
         identification = replace(identification, profiles=curves)
     return identification
+
+
+def _fitted(
+    nominal: Parameters,
+    runs: Sequence[Experiment],
+    setup: FitSetup,
+    loss: Loss,
+    max_evaluations: int,
+    search: Search | None,
+) -> Fit:
+    """The fit, with doubts about what a stated command does between its samples."""
+    result = fit(nominal, runs, setup, loss=loss, max_evaluations=max_evaluations, search=search)
+    if not all(run.input.settled for run in runs):
+        return result
+    doubts = doubt(result.runs, result.nominal, result.setup, loss=loss)
+    return replace(result, doubts=(*result.doubts, *doubts))
 
 
 def _check_counts(**counts: object) -> None:
