@@ -12,21 +12,13 @@ from swashplate.analysis import InverseMap
 from swashplate.crane.axes import AXES, RATE
 from swashplate.crane.control import Controller, Settings
 from swashplate.crane.crane import Crane
-from swashplate.crane.kinematics import (
-    Shafts,
-    Vector,
-    add_scaled,
-    boom_at,
-    rope_length,
-    shaft_torques,
-    tip_of,
-)
-from swashplate.crane.machines import SPEED
+from swashplate.crane.kinematics import Shafts, add_scaled, boom_at, rope_length, tip_of
+from swashplate.crane.machines import LOAD, SPEED
 from swashplate.crane.motion import Body, Brake, Ship
 from swashplate.crane.motion import body as body_model
 from swashplate.crane.motion import brake as brake_model
 from swashplate.crane.rope import GRAVITY, hanging_load
-from swashplate.crane.stages import crew, seeing, steering
+from swashplate.crane.stages import carrying, crew, seeing, steering
 from swashplate.errors import InputError
 from swashplate.machine import Machine, equation, join, late
 
@@ -86,7 +78,7 @@ class _Parts:
         self.members: dict[str, Machine] = {}
         self.links: dict[str, Any] = {}
         self.drivable = {axis: _drivable(crane.inverse(axis)) for axis in AXES}
-        self.first = _first(numbers, loaded=loop.loaded)
+        self.first = _first(numbers)
         self.references = {axis: f"stick.reference_{axis}" for axis in AXES}
         """Reference speed of each shaft so far."""
 
@@ -190,6 +182,8 @@ class _Parts:
 
     def add_drives(self) -> None:
         """Add what turns reference speeds into speeds, and the body that these move."""
+        if self.loop.loaded:
+            self.add("carried", carrying.carried_load(self.numbers), **carrying.WIRES)
         for axis in AXES:
             if self.loop.actuation == "ideal":
                 ideal = Machine(steering.ideal, self.drivable[axis])
@@ -218,22 +212,18 @@ class _Parts:
             inverse = _inverse_machine(self.crane.inverse(axis))
             self.add(command, inverse, reference=self.references[axis])
         if self.loop.loaded:
-            wires["load_torque"] = f"view.torque_{axis}"
+            wires[LOAD] = f"carried.load_torque_{axis}"
         self.add(axis, getattr(self.crane, axis), **wires)
 
 
-def _first(numbers: Body, *, loaded: bool) -> seeing.First:
+def _first(numbers: Body) -> seeing.First:
     """Crane and load before the first sample: the ship at rest, the load at its offset."""
     g, home, start = numbers.geometry, numbers.home, numbers.release
     boom = boom_at(0.0, g, home)
     tip = tip_of(home.slew, boom, g)
     rope = float(rope_length(Shafts(0.0, 0.0, 0.0), g, home))
     hung = hanging_load(tip, start.offset_x, start.offset_y, rope, numbers.hanging)
-    torque = Shafts(0.0, 0.0, 0.0)
-    if loaded:
-        weight = numbers.mass * GRAVITY
-        torque = shaft_torques(Vector(0.0, 0.0, -weight), home.slew, boom, weight, g)
-    return seeing.First(tip, hung.hook, rope, boom, torque, home.slew)
+    return seeing.First(tip, hung.hook, rope, boom, home.slew)
 
 
 @lru_cache(maxsize=64)

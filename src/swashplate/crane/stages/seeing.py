@@ -5,7 +5,7 @@ from __future__ import annotations
 from math import floor
 from typing import NamedTuple
 
-from swashplate.crane.kinematics import Boom, Shafts, Vector
+from swashplate.crane.kinematics import Boom, Vector
 from swashplate.crane.motion import SHIP, Ship
 from swashplate.machine import History, Model, Tap, equation, past
 
@@ -35,15 +35,13 @@ class First(NamedTuple):
     rope: float
     """[m]"""
     boom: Boom
-    torque: Shafts
-    """Of the rope on the shafts. [N m]"""
     home_slew: float
     """[rad]"""
     ship: Ship = Ship()
 
 
 class LastSample(NamedTuple):
-    """The sample before: points [m], shafts [rad], torques of the rope [N m]; and the ship now."""
+    """The sample before: points [m], shafts [rad]; and the ship now."""
 
     tip_x: float
     tip_y: float
@@ -56,9 +54,6 @@ class LastSample(NamedTuple):
     boom_sin: float
     shaft_slew: float
     shaft_luff: float
-    torque_hoist: float
-    torque_slew: float
-    torque_luff: float
     surge: float
     sway: float
     heave: float
@@ -72,7 +67,6 @@ BEFORE = {
     **{f"hook_{axis}": f"hook.{axis}" for axis in "xyz"},
     **{"rope": "rope", "boom_cos": "boom.cos", "boom_sin": "boom.sin"},
     **{"shaft_slew": "", "shaft_luff": ""},
-    **{f"torque_{axis}": f"torque.{axis}" for axis in Shafts._fields},
 }
 """Signals of the body that are known a sample late, each with what it is before the first one."""
 
@@ -119,10 +113,6 @@ class View(NamedTuple):
     shaft_slew: float
     shaft_luff: float
     """[rad]"""
-    torque_hoist: float
-    torque_slew: float
-    torque_luff: float
-    """Of the rope, which the drives take a sample later. [N m]"""
     surge: float
     sway: float
     heave: float
@@ -145,9 +135,6 @@ def seen_now(inputs: LastSample, p: First) -> View:
         height=inputs.tip_z - inputs.heave,
         shaft_slew=inputs.shaft_slew,
         shaft_luff=inputs.shaft_luff,
-        torque_hoist=inputs.torque_hoist,
-        torque_slew=inputs.torque_slew,
-        torque_luff=inputs.torque_luff,
         surge=inputs.surge,
         sway=inputs.sway,
         heave=inputs.heave,
