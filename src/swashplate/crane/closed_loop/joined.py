@@ -28,7 +28,7 @@ STICK = tuple(f"stick.{axis}" for axis in AXES)
 """Inputs: commands of the stick, -1 to 1."""
 VOLTAGES = tuple(f"{axis}.voltage" for axis in AXES)
 """Inputs with direct actuation. [V]"""
-NOISE = tuple(f"sensors.{name}" for name in seeing.Noise._fields)
+NOISE = tuple(f"sensors.{name}" for name in seeing.NOISE)
 """Inputs with sensors."""
 
 
@@ -98,12 +98,19 @@ class _Parts:
         """Reference speeds of slew and luff so far."""
         return {f"reference_{axis}": self.references[axis] for axis in ("slew", "luff")}
 
+    @property
+    def _shafts(self) -> dict[str, Any]:
+        """Angles of slew and luff a sample before."""
+        return {f"shaft_{axis}": late(f"body.shaft_{axis}") for axis in ("slew", "luff")}
+
     def add_crew(self, operator: crew.HumanOperator) -> None:
         """Add eye and hand of a crew."""
         g, slew, luff = self.numbers.geometry, self.drivable["slew"], self.drivable["luff"]
         eye = Machine(crew.eye, crew.Eye(operator, slew, luff, g))
-        seen = [name for name in crew.EyeInputs._fields if not name.startswith("reference")]
-        self.add("eye", eye, **self._command, **{name: f"view.{name}" for name in seen})
+        seen = {
+            name: f"view.{name}" for name in crew.EyeInputs._fields if name in seeing.Seen._fields
+        }
+        self.add("eye", eye, **self._command, **seen, **self._shafts)
         hand = Machine(crew.hand, crew.Hand(operator.delay, operator.lag, slew, luff, g))
         wanted = {name: f"eye.{name}" for name in ("wanted_across", "wanted_along")}
         boom = {name: f"view.{name}" for name in ("boom_cos", "boom_sin")}
@@ -147,7 +154,7 @@ class _Parts:
             clip=settings.clip,
             share=settings.share,
         )
-        posed = ("rope", "boom_cos", "boom_sin", "shaft_slew", "shaft_luff")
+        posed = ("rope", "boom_cos", "boom_sin")
         self.add(
             "follower",
             Machine(steering.follower, following),
@@ -155,18 +162,15 @@ class _Parts:
             **{name: f"feedback.{name}" for name in ("offset_x", "offset_y")},
             **self._add_controller(source),
             **{name: f"view.{name}" for name in posed},
+            **self._shafts,
         )
         self.references |= {axis: f"follower.reference_{axis}" for axis in ("slew", "luff")}
 
     def _add_sensors(self, sensing: seeing.Sensing) -> str:
         """Add sensors; the member from which control takes what it sees."""
-        for name, model, source in (
-            ("sensors", seeing.sensors, "view"),
-            ("measured", seeing.measured, "sensors"),
-        ):
-            seen = {each: f"{source}.{each}" for each in seeing.Seen._fields}
-            self.add(name, Machine(model, sensing), **seen)
-        return "measured"
+        seen = {name: f"view.{name}" for name in seeing.Seen._fields}
+        self.add("sensors", Machine(seeing.sensors, sensing), **seen)
+        return "sensors"
 
     def _add_controller(self, source: str) -> dict[str, str]:
         """Add a user-defined controller; what the follower takes of it."""

@@ -100,10 +100,10 @@ class LinearModel:
     @cached_property
     def _mutual(self) -> BoolArray:
         """(n, n) whether two states act on each other, or a state on itself, at last."""
-        reached = self.A != 0.0
+        reached = np.not_equal(self.A, 0.0)
         while True:
             paths = reached.astype(np.float32)
-            further = reached | (paths @ paths > 0.0)
+            further = np.logical_or(reached, paths @ paths > 0.0)
             if (further == reached).all():
                 return np.asarray(reached & reached.T)
             reached = further
@@ -126,7 +126,7 @@ class LinearModel:
         while left:
             group = [left[0]]
             for member in group:  # which grows
-                others = self._mutual[rows[member]].any(axis=0)
+                others: BoolArray = np.any(self._mutual[rows[member]], axis=0)
                 group += [each for each in left if each not in group and others[rows[each]].any()]
             groups.append(tuple(member for member in left if member in group))
             left = [member for member in left if member not in group]
