@@ -198,7 +198,8 @@ class CraneStepper:
         if self._stepped is None:
             self._stepped = self._start()
         step, context, advance, noise = self._stepped
-        given = self._given_by(commands, ship, noise)
+        moved = np.broadcast_to(ship, (len(commands), len(SHIP)))
+        given = np.hstack([commands, moved, self._noise(len(commands), noise)])
         table, margins = np.empty((len(commands), len(self._outputs))), np.empty(len(commands))
         inputs, outputs, margin = context.inputs, context.outputs, context.margin
         for n, row in enumerate(given):
@@ -212,16 +213,15 @@ class CraneStepper:
         table = table.T
         return Signals(self._stored(table, commands), self.fixed.columns).table()
 
-    def _given_by(self, commands: Array, ship: Array, noise: np.random.Generator) -> Array:
-        """(n, inputs) what the compiled step is given: commands, ship, noise of the sensors."""
+    def _noise(self, count: int, noise: np.random.Generator) -> Array:
+        """(count, 4) noise of the sensors in the next samples; without sensors (count, 0)."""
         sensing = self.fixed.settings.sensing
-        columns = [commands, np.broadcast_to(ship, (len(commands), len(SHIP)))]
-        if sensing is not None:
-            measures = _measures(self._samples + np.arange(len(commands)), sensing.rate)
-            drawn = np.zeros((len(commands), len(NOISE)))
-            drawn[measures] = noise.standard_normal((measures.sum(), len(NOISE)))
-            columns.append(drawn)
-        return np.concatenate(columns, axis=1)
+        if sensing is None:
+            return np.empty((count, 0))
+        measures = _measures(self._samples + np.arange(count), sensing.rate)
+        drawn = np.zeros((count, len(NOISE)))
+        drawn[measures] = noise.standard_normal((measures.sum(), len(NOISE)))
+        return drawn
 
     def run(self, commands: Array, ship: Array) -> Array:
         """March a complete run and return its stored signals, by `Fixed.columns`."""
@@ -244,15 +244,12 @@ class CraneStepper:
 
     def _inputs(self, commands: Array, ship: Array) -> dict[str, Array]:
         """What the machine of a complete run is given; a ship at rest is left out."""
-        names = [*(VOLTAGES if self._direct else STICK), *SHIP, *NOISE]
-        given = self._given_by(commands, ship, np.random.default_rng(self._seed))
-        moves = ship.shape[1] > 1
-        columns = zip(names, given.T, strict=False)
-        return {
-            name: np.ascontiguousarray(column)
-            for name, column in columns
-            if moves or name not in SHIP
-        }
+        given = dict(zip(VOLTAGES if self._direct else STICK, commands.T, strict=True))
+        if ship.shape[1] > 1:
+            given |= zip(SHIP, ship.T, strict=True)
+        noise = self._noise(len(commands), np.random.default_rng(self._seed))
+        given |= zip(NOISE, noise.T, strict=False)
+        return {name: np.ascontiguousarray(column) for name, column in given.items()}
 
     def _stored(self, table: Array, commands: Array) -> Array:
         """What is stored of a run, by `Fixed.columns`, of the machine's outputs, a row each."""
