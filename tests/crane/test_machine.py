@@ -59,6 +59,83 @@ def test_machine_has_the_bits_of_a_run_in_open_loop(crane, how, sea):
     assert np.ptp(run["load_x"]) > 0.5
 
 
+# --- load on the drives ---------------------------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def leaking(crane):
+    return crane.with_drive(
+        hoist=crane.hoist.replace(motor_leakage=1e-6), luff=crane.luff.replace(motor_leakage=1e-6)
+    )
+
+
+LOADED = [({}, None), ({"suspension": BOTH}, "ss3"), ({"loaded": False, "brake": False}, None)]
+
+
+@pytest.mark.parametrize(("how", "sea"), rest_slow(LOADED, 1))
+def test_loaded_machine_has_the_bits_of_a_run_in_open_loop(leaking, how, sea):
+    waters = None if sea is None else Seaway(sea, seed=1)
+    run = simulate_crane(leaking, command(6.0), sea=waters, **how)
+    machine = plant(leaking, **how)
+    found = simulate(machine, inputs_of(run), 512.0)
+    for name in SIGNALS:
+        np.testing.assert_array_equal(found[f"body.{name}"], run[name], name)
+    taken = "hoist.load_torque" in machine.ports.external
+    assert taken == (how.get("loaded") is False)
+    if not taken:
+        for axis in AXES:
+            given = found[f"carried.load_torque_{axis}"]
+            np.testing.assert_array_equal(given, run[f"torque_{axis}"])
+            np.testing.assert_array_equal(given[1:], found[f"body.torque_{axis}"][:-1])
+    # 35 t on two falls of a drum of 0.4 m
+    mass = leaking.safe_load + how.get("suspension", Suspension()).hook
+    assert run["torque_hoist"][0] == (0.0 if taken else pytest.approx(mass * G * 0.2, rel=1e-12))
+
+
+def test_a_bouncing_load_is_damped_by_what_the_hoist_leaks(crane):
+    leakage, stiffness, rope = 1e-6, 6e7, 20.0
+    leaking = crane.with_drive(hoist=crane.hoist.replace(motor_leakage=leakage))
+    bounce = Suspension(stiffness=stiffness, bounce_damping=0.0)
+    how = {"rope_m": rope, "swing_damping": 0.0, "suspension": bounce, "brake": False}
+    at = {f"{axis}.voltage": 0.0 for axis in AXES} | STILL
+    by_load = {}
+    for loaded in (False, True):
+        model = linearize(plant(leaking, loaded=loaded, **how), at, 512.0)
+        poles = model.poles[(np.abs(model.poles) > 1e-3) & (np.abs(model.poles - 1.0) > 1e-6)]
+        s = np.log(poles) * 512.0
+        k, arm = stiffness / rope, crane.geometry.hoist
+        own = sqrt(k / crane.safe_load)
+        near = s[np.abs(np.abs(s) - own) < 0.01 * own]
+        assert near.size == 2
+        by_load[loaded] = -near.real / np.abs(near)
+    np.testing.assert_allclose(by_load[False], 0.0, atol=1e-9)
+    # m x'' = -T and T' = k (x' - r² K T): s² + k r² K s + k/m = 0; the torque is a sample late
+    damping = 0.5 * arm**2 * leakage * sqrt(k * crane.safe_load)
+    np.testing.assert_allclose(by_load[True], damping, rtol=0.01)
+
+
+def test_drives_that_a_load_moves_are_one_group_with_the_body(crane):
+    line = crane.hoist.replace(motor_leakage=1e-6, line_stiffness=1e6, load_inertia=5e3)
+    at = {f"{axis}.voltage": 0.0 for axis in AXES} | STILL
+    elastic = crane.with_drive(hoist=line)
+    groups = []
+    for loaded in (False, True):
+        machine = plant(elastic, loaded=loaded, suspension=ELASTIC, brake=False)
+        groups.append(linearize(machine, at, 512.0).groups_of((*AXES, "body")))
+    assert groups[0] == [("hoist",), ("slew",), ("luff",), ("body",)]
+    assert groups[1] == [("hoist", "body"), ("slew",), ("luff",)]
+
+
+@pytest.mark.slow
+def test_loads_that_no_drive_takes_are_refused(crane):
+    with pytest.raises(InputError, match=r"tg3637 .* load: .* motor_leakage"):
+        plant(crane, loaded=True)
+    worn = crane.with_drive(hoist=crane.hoist.replace(motor_leakage=3e-6))
+    with pytest.raises(InputError, match=r"hoist of tg3637 .* 35000 kg .* rigid rope"):
+        plant(worn)
+    assert "carried" in plant(worn, suspension=ELASTIC).model.every_signal[0]
+
+
 # --- other drives ---------------------------------------------------------------------------------
 
 
@@ -90,6 +167,37 @@ def test_a_winch_of_ones_own_lifts_the_load(crane):
     assert angle == pytest.approx(2.0 * (1023 / 512 - 0.2), rel=1e-2)
     rise = run["load_z"][-1] - run["load_z"][0]
     assert rise == pytest.approx(crane.geometry.hoist * angle, abs=5e-3)
+
+
+class Slipping(NamedTuple):
+    shaft_speed: float
+
+
+class Turned(NamedTuple):
+    speed: float = 0.0
+
+
+@equation
+def turn_and_slip(state: Turned, voltage: float, load_torque: float, p: Winch) -> Slipping:
+    return Slipping(state.speed - 1e-6 * load_torque)
+
+
+@equation
+def turned(state: Turned, voltage: float, p: Winch, h: float) -> Turned:
+    return Turned(state.speed + h / p.lag * (p.gain * voltage - state.speed))
+
+
+slipping = Model("winch", Winch, Turned, turned, turn_and_slip)
+
+
+def test_a_winch_of_ones_own_takes_the_load_if_it_has_an_input_for_it(crane):
+    winch = Machine(slipping, Winch(0.5, 0.2))
+    volts = {"hoist.voltage": np.full(1024, 4.0), "slew.voltage": 0.0, "luff.voltage": 0.0}
+    run = simulate(plant(crane, drives={"hoist": winch}), volts | STILL, 512.0)
+    # 2 rad/s less what 35 t on two falls of a drum of 0.4 m take
+    assert run["hoist.shaft_speed"][-1] == pytest.approx(2.0 - 1e-6 * 35000.0 * G * 0.2, rel=1e-3)
+    free = plant(crane, drives={"hoist": winch}, loaded=False)
+    assert "hoist.load_torque" in free.ports.external
 
 
 @pytest.mark.slow

@@ -177,6 +177,10 @@ def test_a_linear_model_keeps_what_comes_late():
     assert model.states == ("law.n", "tank.height", "tank.level_1")
     # level' = height + 0.1 push with push = 1.3 (target - level)
     np.testing.assert_allclose(model.A[2], [0.0, 1.0, -0.13])
+    # height' = height - 6.5 h level: what the loop remembers is no delay that may be left out
+    looped = np.roots([1.0, -0.87, 6.5 / RATE - 0.13])
+    np.testing.assert_allclose(model.poles, [1.0, looped.max(), looped.min()], rtol=1e-9)
+    assert model.groups_of(("law", "tank")) == [("law",), ("tank",)]
 
 
 def test_what_has_no_derivatives_says_so():

@@ -207,7 +207,7 @@ def poles_table(model: LinearModel) -> Table:
 def modes_table(model: LinearModel, members: Sequence[str]) -> Table:
     """Modes of the members of a joined machine, of two conjugate poles the upper one.
 
-    Members act on those after them alone, so that the poles of each are its own.
+    Of members that act on each other they are common; of the others each has its own.
     """
     import numpy as np
 
@@ -221,8 +221,9 @@ def modes_table(model: LinearModel, members: Sequence[str]) -> Table:
     )
     table = Table("", columns)
     others = 0
-    for member in members:
-        poles = model.poles_of(*[name for name in model.states if name.startswith(f"{member}.")])
+    for group in model.groups_of(members):
+        beginnings = tuple(f"{member}." for member in group)
+        poles = model.poles_of(*[name for name in model.states if name.startswith(beginnings)])
         moving = (np.abs(poles) >= GONE) & (np.abs(poles - 1.0) >= INTEGRATES)
         others += int((~moving).sum())
         for pole in poles[moving & (poles.imag >= 0.0)]:
@@ -230,6 +231,13 @@ def modes_table(model: LinearModel, members: Sequence[str]) -> Table:
             size = float(abs(s))
             imaginary = f"±{s.imag:.5g}" if s.imag else ""
             frequency = size / (2.0 * pi)
-            table.add(member, float(s.real), imaginary, "rad/s", frequency, -float(s.real) / size)
+            table.add(
+                ", ".join(group),
+                float(s.real),
+                imaginary,
+                "rad/s",
+                frequency,
+                -float(s.real) / size,
+            )
     table.caption = f"{count(others, 'pole')} more: gone within a few steps, or integrate"
     return table

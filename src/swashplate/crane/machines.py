@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from functools import lru_cache
 from math import hypot, isfinite, sin
 from numbers import Real
 from typing import Any, TypedDict, Unpack
@@ -15,6 +16,8 @@ from swashplate.crane.motion import Body, Brake, Travel
 from swashplate.crane.motion import body as body_model
 from swashplate.crane.motion import brake as brake_model
 from swashplate.crane.rope import AIR, Start, Suspension
+from swashplate.crane.stages.carrying import WIRES, carried_load
+from swashplate.drive import Drive
 from swashplate.errors import InputError
 from swashplate.machine import Machine, join
 
@@ -26,8 +29,12 @@ FARTHEST = 0.9
 """Largest offset of the load at the start, as a part of the rope: at 64 degrees."""
 FASTEST_START = 100.0
 """Largest velocity of the load at the start. [m/s]"""
-SPEED, COMMAND = "shaft_speed", "voltage"
-"""Signal of a drive that moves the body, and input of the hoist that its brake looks at."""
+SPEED, COMMAND, LOAD = "shaft_speed", "voltage", "load_torque"
+"""Signal of a drive that moves the body, input of the hoist that its brake looks at, and input of a
+drive that the rope loads."""
+QUICKEST = 0.4
+"""Largest part of a rope's pull by which a leaking drive may lower it within a sample: at 0.7 they
+would swing against each other from sample to sample."""
 
 
 class Placing(TypedDict, total=False):
@@ -75,6 +82,7 @@ def plant(
     *,
     drives: Mapping[str, Machine] | None = None,
     brake: bool = True,
+    loaded: bool | None = None,
     **placing: Unpack[Placing],
 ) -> Machine:
     """A crane as a machine: three drives, boom, rope and load, on a moving ship.
@@ -89,23 +97,28 @@ def plant(
     brake : bool
         Whether a brake holds the hoist 0.3 s after its voltage has come into the dead zone. A hoist
         of `drives` has its brake in its own equations.
+    loaded : bool, default whether a drive feels a load
+        Whether the rope loads the drives, as in a run: its tension is a torque on each shaft, which
+        they take a sample later as their ``load_torque``. A machine of `drives` with an input of
+        that name counts as feeling it.
     **placing
         Where it begins and what hangs on it: see `Placing`.
 
     Returns
     -------
     Machine
-        Members ``hoist``, ``slew``, ``luff``, ``brake`` and ``body``. Inputs are those of the
-        drives, ``hoist.voltage`` [V], and the ship's motion, ``body.surge`` [m] to ``body.yaw``
-        [rad]. Signals are those of the drives and of the `body`. What the load does to the drives
-        is given out, ``body.torque_hoist``, and taken in as ``hoist.load_torque``: whoever steps
-        the machine passes it on, a sample later.
+        Members ``hoist``, ``slew``, ``luff``, ``brake`` and ``body``, and ``carried`` if the rope
+        loads the drives. Inputs are those of the drives, ``hoist.voltage`` [V], and the ship's
+        motion, ``body.surge`` [m] to ``body.yaw`` [rad]. Signals are those of the drives and of the
+        `body`. The rope's torques are given out, ``body.torque_hoist``. Drives that it does not
+        load have the input ``hoist.load_torque``, for whoever steps the machine.
 
     Raises
     ------
     InputError
-        For an axis that a crane does not have, a machine without a shaft's speed, and a start or a
-        load that the crane does not allow.
+        For an axis that a crane does not have, a machine without a shaft's speed, a start or a load
+        that the crane does not allow, and a load on drives that feel none or that give way to it
+        within a sample.
 
     Examples
     --------
@@ -121,7 +134,7 @@ def plant(
     """
     given = dict(drives or {})
     check_names("A crane has no drive", given, AXES, "it has")
-    members = {axis: given.get(axis, getattr(crane, axis)) for axis in AXES}
+    members: dict[str, Machine] = own_drives(crane) | given
     for axis, machine in members.items():
         ports = getattr(machine, "ports", None)
         if ports is None or SPEED not in ports.every_signal:
@@ -129,7 +142,8 @@ def plant(
                 f"The {axis} of {crane.name} is {machine!r}, but must be a machine with a signal "
                 f"'{SPEED}'."
             )
-    links = {f"body.{axis}_speed": f"{axis}.{SPEED}" for axis in AXES}
+    numbers = body_numbers(crane, **placing)
+    links: dict[str, Any] = {f"body.{axis}_speed": f"{axis}.{SPEED}" for axis in AXES}
     if brake and "hoist" not in given:
         lower, upper = _dead_zone(crane)
         members["brake"] = Machine(brake_model, Brake(lower, upper))
@@ -138,7 +152,13 @@ def plant(
             "brake.speed": f"hoist.{SPEED}",
             "body.hoist_speed": "brake.braked_speed",
         }
-    members["body"] = body(crane, **placing)
+    if carries_load(crane, members, numbers, loaded):
+        links |= {f"carried.{taken}": signal for taken, signal in WIRES.items()}
+        for axis in AXES:
+            if LOAD in members[axis].ports.external:
+                links[f"{axis}.{LOAD}"] = f"carried.load_torque_{axis}"
+        members = {"carried": carried_load(numbers), **members}
+    members["body"] = Machine(body_model, numbers)
     outputs = [f"{axis}.{SPEED}" for axis in AXES] + [f"body.{name}" for name in body_model.outputs]
     whole: Machine = join(crane.name, members, links=links, outputs=tuple(outputs))
     return whole
@@ -179,6 +199,55 @@ def body(crane: Crane, **placing: Unpack[Placing]) -> Machine:
     25
     """
     return Machine(body_model, body_numbers(crane, **placing))
+
+
+def own_drives(crane: Crane) -> dict[str, Any]:
+    """A crane's own drives, by axis."""
+    return {axis: getattr(crane, axis) for axis in AXES}
+
+
+def carries_load(
+    crane: Crane, drives: Mapping[str, Machine], numbers: Body, asked: bool | None
+) -> bool:
+    """Whether the rope loads the drives: as it is asked, or if one of them feels it.
+
+    Refuses loads on drives that feel none, or that answer them faster than a sample.
+    """
+    feels = any(map(feels_load, drives.values()))
+    if not (feels if asked is None else asked):
+        return False
+    if not feels:
+        raise InputError(
+            f"No drive of {crane.name} feels a load: give one a motor_leakage or a "
+            "line_stiffness, as crane.hoist.replace(motor_leakage=1e-6), or leave out 'loaded'."
+        )
+    for axis, arm in (("hoist", crane.geometry.hoist), ("luff", crane.geometry.luff)):
+        drive = drives[axis]
+        lost = _speed_lost(drive) if isinstance(drive, Drive) else 0.0
+        gives = 0.5 * RATE * numbers.mass * arm * arm * lost
+        if not numbers.hanging.stiffness > 0.0 and gives > QUICKEST:
+            raise InputError(
+                f"The {axis} of {crane.name} gives way to {numbers.mass:g} kg on a rigid rope "
+                f"within a sample, since its motor_leakage costs {lost:.3g} rad/s per N m: use an "
+                "elastic rope, suspension=Suspension(stiffness=6e7)."
+            )
+    return True
+
+
+def feels_load(drive: Machine) -> bool:
+    """Whether a drive turns in another way if its shaft is loaded."""
+    if isinstance(drive, Drive):
+        return "line" in drive.parameters.options or _speed_lost(drive) != 0.0
+    return LOAD in drive.ports.external
+
+
+@lru_cache(maxsize=64)
+def _speed_lost(drive: Drive) -> float:
+    """Speed that a drive loses instantaneously for each N m of load. [rad/s/(N m)]"""
+    torque = 1e5
+    unloaded = drive.simulate([0.0], load_torque=0.0)
+    loaded = drive.simulate([0.0], load_torque=torque)
+    return float(unloaded.shaft_speed[0] - loaded.shaft_speed[0]) / torque
 
 
 def _dead_zone(crane: Crane) -> tuple[float, float]:

@@ -12,21 +12,13 @@ from swashplate.analysis import InverseMap
 from swashplate.crane.axes import AXES, RATE
 from swashplate.crane.control import Controller, Settings
 from swashplate.crane.crane import Crane
-from swashplate.crane.kinematics import (
-    Shafts,
-    Vector,
-    add_scaled,
-    boom_at,
-    rope_length,
-    shaft_torques,
-    tip_of,
-)
-from swashplate.crane.machines import SPEED
+from swashplate.crane.kinematics import Shafts, add_scaled, boom_at, rope_length, tip_of
+from swashplate.crane.machines import LOAD, SPEED
 from swashplate.crane.motion import Body, Brake, Ship
 from swashplate.crane.motion import body as body_model
 from swashplate.crane.motion import brake as brake_model
 from swashplate.crane.rope import GRAVITY, hanging_load
-from swashplate.crane.stages import crew, seeing, steering
+from swashplate.crane.stages import carrying, crew, seeing, steering
 from swashplate.errors import InputError
 from swashplate.machine import Machine, equation, join, late
 
@@ -36,7 +28,7 @@ STICK = tuple(f"stick.{axis}" for axis in AXES)
 """Inputs: commands of the stick, -1 to 1."""
 VOLTAGES = tuple(f"{axis}.voltage" for axis in AXES)
 """Inputs with direct actuation. [V]"""
-NOISE = tuple(f"sensors.{name}" for name in seeing.Noise._fields)
+NOISE = tuple(f"sensors.{name}" for name in seeing.NOISE)
 """Inputs with sensors."""
 
 
@@ -86,7 +78,7 @@ class _Parts:
         self.members: dict[str, Machine] = {}
         self.links: dict[str, Any] = {}
         self.drivable = {axis: _drivable(crane.inverse(axis)) for axis in AXES}
-        self.first = _first(numbers, loaded=loop.loaded)
+        self.first = _first(numbers)
         self.references = {axis: f"stick.reference_{axis}" for axis in AXES}
         """Reference speed of each shaft so far."""
 
@@ -106,12 +98,19 @@ class _Parts:
         """Reference speeds of slew and luff so far."""
         return {f"reference_{axis}": self.references[axis] for axis in ("slew", "luff")}
 
+    @property
+    def _shafts(self) -> dict[str, Any]:
+        """Angles of slew and luff a sample before."""
+        return {f"shaft_{axis}": late(f"body.shaft_{axis}") for axis in ("slew", "luff")}
+
     def add_crew(self, operator: crew.HumanOperator) -> None:
         """Add eye and hand of a crew."""
         g, slew, luff = self.numbers.geometry, self.drivable["slew"], self.drivable["luff"]
         eye = Machine(crew.eye, crew.Eye(operator, slew, luff, g))
-        seen = [name for name in crew.EyeInputs._fields if not name.startswith("reference")]
-        self.add("eye", eye, **self._command, **{name: f"view.{name}" for name in seen})
+        seen = {
+            name: f"view.{name}" for name in crew.EyeInputs._fields if name in seeing.Seen._fields
+        }
+        self.add("eye", eye, **self._command, **seen, **self._shafts)
         hand = Machine(crew.hand, crew.Hand(operator.delay, operator.lag, slew, luff, g))
         wanted = {name: f"eye.{name}" for name in ("wanted_across", "wanted_along")}
         boom = {name: f"view.{name}" for name in ("boom_cos", "boom_sin")}
@@ -155,7 +154,7 @@ class _Parts:
             clip=settings.clip,
             share=settings.share,
         )
-        posed = ("rope", "boom_cos", "boom_sin", "shaft_slew", "shaft_luff")
+        posed = ("rope", "boom_cos", "boom_sin")
         self.add(
             "follower",
             Machine(steering.follower, following),
@@ -163,18 +162,15 @@ class _Parts:
             **{name: f"feedback.{name}" for name in ("offset_x", "offset_y")},
             **self._add_controller(source),
             **{name: f"view.{name}" for name in posed},
+            **self._shafts,
         )
         self.references |= {axis: f"follower.reference_{axis}" for axis in ("slew", "luff")}
 
     def _add_sensors(self, sensing: seeing.Sensing) -> str:
         """Add sensors; the member from which control takes what it sees."""
-        for name, model, source in (
-            ("sensors", seeing.sensors, "view"),
-            ("measured", seeing.measured, "sensors"),
-        ):
-            seen = {each: f"{source}.{each}" for each in seeing.Seen._fields}
-            self.add(name, Machine(model, sensing), **seen)
-        return "measured"
+        seen = {name: f"view.{name}" for name in seeing.Seen._fields}
+        self.add("sensors", Machine(seeing.sensors, sensing), **seen)
+        return "sensors"
 
     def _add_controller(self, source: str) -> dict[str, str]:
         """Add a user-defined controller; what the follower takes of it."""
@@ -190,6 +186,8 @@ class _Parts:
 
     def add_drives(self) -> None:
         """Add what turns reference speeds into speeds, and the body that these move."""
+        if self.loop.loaded:
+            self.add("carried", carrying.carried_load(self.numbers), **carrying.WIRES)
         for axis in AXES:
             if self.loop.actuation == "ideal":
                 ideal = Machine(steering.ideal, self.drivable[axis])
@@ -218,22 +216,18 @@ class _Parts:
             inverse = _inverse_machine(self.crane.inverse(axis))
             self.add(command, inverse, reference=self.references[axis])
         if self.loop.loaded:
-            wires["load_torque"] = f"view.torque_{axis}"
+            wires[LOAD] = f"carried.load_torque_{axis}"
         self.add(axis, getattr(self.crane, axis), **wires)
 
 
-def _first(numbers: Body, *, loaded: bool) -> seeing.First:
+def _first(numbers: Body) -> seeing.First:
     """Crane and load before the first sample: the ship at rest, the load at its offset."""
     g, home, start = numbers.geometry, numbers.home, numbers.release
     boom = boom_at(0.0, g, home)
     tip = tip_of(home.slew, boom, g)
     rope = float(rope_length(Shafts(0.0, 0.0, 0.0), g, home))
     hung = hanging_load(tip, start.offset_x, start.offset_y, rope, numbers.hanging)
-    torque = Shafts(0.0, 0.0, 0.0)
-    if loaded:
-        weight = numbers.mass * GRAVITY
-        torque = shaft_torques(Vector(0.0, 0.0, -weight), home.slew, boom, weight, g)
-    return seeing.First(tip, hung.hook, rope, boom, torque, home.slew)
+    return seeing.First(tip, hung.hook, rope, boom, home.slew)
 
 
 @lru_cache(maxsize=64)

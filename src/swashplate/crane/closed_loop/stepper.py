@@ -31,11 +31,10 @@ from swashplate.crane.closed_loop.signals import (
 from swashplate.crane.control import GIVES, Control, Settings, stages_of
 from swashplate.crane.crane import Crane
 from swashplate.crane.kinematics import Geometry, Home
-from swashplate.crane.machines import SPEED, Placing, body_numbers
+from swashplate.crane.machines import SPEED, Placing, body_numbers, carries_load, own_drives
 from swashplate.crane.motion import Body
 from swashplate.crane.rope import Hanging, swing_of, too_fast_sentence
 from swashplate.crane.stages.seeing import ROUNDING
-from swashplate.drive import Drive
 from swashplate.errors import DomainError, InputError
 from swashplate.machine import Machine
 from swashplate.machine.marching import (
@@ -53,9 +52,6 @@ Actuation = Literal["ideal", "volts", "inverse", "direct"]
 ACTUATIONS: tuple[str, ...] = get_args(Actuation)
 NO_NUMBER, ROPE_OUT, BOOM_OUT, TOO_FAST = "number", "rope", "boom", "fast"
 """What stops a run; of two at one sample the first."""
-QUICKEST = 0.4
-"""Largest part of a rope's pull by which a leaking drive may lower it within a sample: at 0.7 they
-would swing against each other from sample to sample."""
 
 
 class RunOptions(Placing, total=False):
@@ -202,7 +198,8 @@ class CraneStepper:
         if self._stepped is None:
             self._stepped = self._start()
         step, context, advance, noise = self._stepped
-        given = self._given_by(commands, ship, noise)
+        moved = np.broadcast_to(ship, (len(commands), len(SHIP)))
+        given = np.hstack([commands, moved, self._noise(len(commands), noise)])
         table, margins = np.empty((len(commands), len(self._outputs))), np.empty(len(commands))
         inputs, outputs, margin = context.inputs, context.outputs, context.margin
         for n, row in enumerate(given):
@@ -216,16 +213,15 @@ class CraneStepper:
         table = table.T
         return Signals(self._stored(table, commands), self.fixed.columns).table()
 
-    def _given_by(self, commands: Array, ship: Array, noise: np.random.Generator) -> Array:
-        """(n, inputs) what the compiled step is given: commands, ship, noise of the sensors."""
+    def _noise(self, count: int, noise: np.random.Generator) -> Array:
+        """(count, 4) noise of the sensors in the next samples; without sensors (count, 0)."""
         sensing = self.fixed.settings.sensing
-        columns = [commands, np.broadcast_to(ship, (len(commands), len(SHIP)))]
-        if sensing is not None:
-            measures = _measures(self._samples + np.arange(len(commands)), sensing.rate)
-            drawn = np.zeros((len(commands), len(NOISE)))
-            drawn[measures] = noise.standard_normal((measures.sum(), len(NOISE)))
-            columns.append(drawn)
-        return np.concatenate(columns, axis=1)
+        if sensing is None:
+            return np.empty((count, 0))
+        measures = _measures(self._samples + np.arange(count), sensing.rate)
+        drawn = np.zeros((count, len(NOISE)))
+        drawn[measures] = noise.standard_normal((measures.sum(), len(NOISE)))
+        return drawn
 
     def run(self, commands: Array, ship: Array) -> Array:
         """March a complete run and return its stored signals, by `Fixed.columns`."""
@@ -248,15 +244,12 @@ class CraneStepper:
 
     def _inputs(self, commands: Array, ship: Array) -> dict[str, Array]:
         """What the machine of a complete run is given; a ship at rest is left out."""
-        names = [*(VOLTAGES if self._direct else STICK), *SHIP, *NOISE]
-        given = self._given_by(commands, ship, np.random.default_rng(self._seed))
-        moves = ship.shape[1] > 1
-        columns = zip(names, given.T, strict=False)
-        return {
-            name: np.ascontiguousarray(column)
-            for name, column in columns
-            if moves or name not in SHIP
-        }
+        given = dict(zip(VOLTAGES if self._direct else STICK, commands.T, strict=True))
+        if ship.shape[1] > 1:
+            given |= zip(SHIP, ship.T, strict=True)
+        noise = self._noise(len(commands), np.random.default_rng(self._seed))
+        given |= zip(NOISE, noise.T, strict=False)
+        return {name: np.ascontiguousarray(column) for name, column in given.items()}
 
     def _stored(self, table: Array, commands: Array) -> Array:
         """What is stored of a run, by `Fixed.columns`, of the machine's outputs, a row each."""
@@ -366,7 +359,7 @@ def _outputs(fixed: Fixed, loop: ControlLoop) -> list[str]:
     if fixed.columns.hook != ABSENT:
         outputs += [f"body.hook_{axis}" for axis in "xyz"]
     if fixed.loaded:
-        outputs += [f"view.torque_{axis}" for axis in AXES]
+        outputs += [f"carried.load_torque_{axis}" for axis in AXES]
     if loop.controller is not None:
         outputs += [f"controller.{name}" for name in GIVES]
     return outputs
@@ -384,10 +377,13 @@ def _fixed(
     if actuation not in ACTUATIONS:
         raise InputError(f"actuation is '{actuation}'; it is {', '.join(ACTUATIONS[:-1])}.")
     numbers = body_numbers(crane, **placing)
-    if loaded is None:
-        loaded = actuation != "ideal" and feels_load(crane)
-    if loaded:
-        _check_loaded(crane, actuation, numbers)
+    if actuation == "ideal":
+        if loaded:
+            raise InputError(
+                "Ideal drives follow instantaneously, whatever the load: leave out 'loaded'."
+            )
+        loaded = False
+    loaded = carries_load(crane, own_drives(crane), numbers, loaded)
     travel = numbers.travel
     return numbers, Fixed(
         geometry=numbers.geometry,
@@ -398,47 +394,10 @@ def _fixed(
         ropes=(travel.shortest, travel.longest),
         mass=numbers.mass,
         hanging=numbers.hanging,
-        loaded=bool(loaded),
+        loaded=loaded,
         columns=columns_of(
             ideal=actuation == "ideal",
             hooked=numbers.hanging.sling > 0.0,
-            loaded=bool(loaded),
+            loaded=loaded,
         ),
     )
-
-
-def _check_loaded(crane: Crane, actuation: str, numbers: Body) -> None:
-    """Refuse loads on drives that feel none, or that answer them faster than a sample."""
-    if actuation == "ideal":
-        raise InputError(
-            "Ideal drives follow instantaneously, whatever the load: leave out 'loaded'."
-        )
-    lost = {axis: _speed_lost(getattr(crane, axis)) for axis in AXES}
-    if not feels_load(crane):
-        raise InputError(
-            f"No drive of {crane.name} feels a load: give one a motor_leakage or a "
-            "line_stiffness, as crane.hoist.replace(motor_leakage=1e-6), or leave out 'loaded'."
-        )
-    for axis, arm in (("hoist", crane.geometry.hoist), ("luff", crane.geometry.luff)):
-        gives = 0.5 * RATE * numbers.mass * arm * arm * lost[axis]
-        if not numbers.hanging.stiffness > 0.0 and gives > QUICKEST:
-            raise InputError(
-                f"The {axis} of {crane.name} gives way to {numbers.mass:g} kg on a rigid rope "
-                f"within a sample, since its motor_leakage costs {lost[axis]:.3g} rad/s per N m: "
-                "use an elastic rope, suspension=Suspension(stiffness=6e7)."
-            )
-
-
-def feels_load(crane: Crane) -> bool:
-    """Whether a drive of a crane turns in another way if its shaft is loaded."""
-    drives = [getattr(crane, axis) for axis in AXES]
-    return any("line" in drive.parameters.options or _speed_lost(drive) for drive in drives)
-
-
-@lru_cache(maxsize=64)
-def _speed_lost(drive: Drive) -> float:
-    """Speed that a drive loses instantaneously for each N m of load. [rad/s/(N m)]"""
-    torque = 1e5
-    unloaded = drive.simulate([0.0], load_torque=0.0)
-    loaded = drive.simulate([0.0], load_torque=torque)
-    return float(unloaded.shaft_speed[0] - loaded.shaft_speed[0]) / torque

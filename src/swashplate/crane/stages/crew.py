@@ -90,7 +90,7 @@ class Eye(NamedTuple):
 
 
 class EyeInputs(NamedTuple):
-    """Command [rad/s], and view from the cab, which rolls with the ship; as of `seeing.View`."""
+    """Command [rad/s], and view from the cab, which rolls with the ship; as of `seeing.Seen`."""
 
     reference_slew: float
     reference_luff: float

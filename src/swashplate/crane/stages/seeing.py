@@ -5,7 +5,7 @@ from __future__ import annotations
 from math import floor
 from typing import NamedTuple
 
-from swashplate.crane.kinematics import Boom, Shafts, Vector
+from swashplate.crane.kinematics import Boom, Vector
 from swashplate.crane.motion import SHIP, Ship
 from swashplate.machine import History, Model, Tap, equation, past
 
@@ -35,15 +35,13 @@ class First(NamedTuple):
     rope: float
     """[m]"""
     boom: Boom
-    torque: Shafts
-    """Of the rope on the shafts. [N m]"""
     home_slew: float
     """[rad]"""
     ship: Ship = Ship()
 
 
 class LastSample(NamedTuple):
-    """The sample before: points [m], shafts [rad], torques of the rope [N m]; and the ship now."""
+    """The sample before: points [m], angle of the slew from home [rad]; and the ship now."""
 
     tip_x: float
     tip_y: float
@@ -55,10 +53,6 @@ class LastSample(NamedTuple):
     boom_cos: float
     boom_sin: float
     shaft_slew: float
-    shaft_luff: float
-    torque_hoist: float
-    torque_slew: float
-    torque_luff: float
     surge: float
     sway: float
     heave: float
@@ -70,9 +64,7 @@ class LastSample(NamedTuple):
 BEFORE = {
     **{f"tip_{axis}": f"tip.{axis}" for axis in "xyz"},
     **{f"hook_{axis}": f"hook.{axis}" for axis in "xyz"},
-    **{"rope": "rope", "boom_cos": "boom.cos", "boom_sin": "boom.sin"},
-    **{"shaft_slew": "", "shaft_luff": ""},
-    **{f"torque_{axis}": f"torque.{axis}" for axis in Shafts._fields},
+    **{"rope": "rope", "boom_cos": "boom.cos", "boom_sin": "boom.sin", "shaft_slew": ""},
 }
 """Signals of the body that are known a sample late, each with what it is before the first one."""
 
@@ -82,7 +74,8 @@ class Seen(NamedTuple):
 
     swing_x: float
     swing_y: float
-    """Load, or hook, less tip, horizontal and inertial. [m]"""
+    swing_z: float
+    """End of the rope less tip, inertial. [m]"""
     rope: float
     """[m]"""
     slew: float
@@ -101,40 +94,10 @@ class Seen(NamedTuple):
     """[rad]"""
 
 
-class View(NamedTuple):
-    """What is known of the sample before."""
-
-    swing_x: float
-    swing_y: float
-    swing_z: float
-    """End of the rope less tip, inertial. [m]"""
-    rope: float
-    """[m]"""
-    slew: float
-    """From forward. [rad]"""
-    boom_cos: float
-    boom_sin: float
-    height: float
-    """[m]"""
-    shaft_slew: float
-    shaft_luff: float
-    """[rad]"""
-    torque_hoist: float
-    torque_slew: float
-    torque_luff: float
-    """Of the rope, which the drives take a sample later. [N m]"""
-    surge: float
-    sway: float
-    heave: float
-    roll: float
-    pitch: float
-    yaw: float
-
-
 @equation
-def seen_now(inputs: LastSample, p: First) -> View:
+def seen_now(inputs: LastSample, p: First) -> Seen:
     """The sample before, as crew and control look at it."""
-    return View(
+    return Seen(
         swing_x=inputs.hook_x - inputs.tip_x,
         swing_y=inputs.hook_y - inputs.tip_y,
         swing_z=inputs.hook_z - inputs.tip_z,
@@ -143,11 +106,6 @@ def seen_now(inputs: LastSample, p: First) -> View:
         boom_cos=inputs.boom_cos,
         boom_sin=inputs.boom_sin,
         height=inputs.tip_z - inputs.heave,
-        shaft_slew=inputs.shaft_slew,
-        shaft_luff=inputs.shaft_luff,
-        torque_hoist=inputs.torque_hoist,
-        torque_slew=inputs.torque_slew,
-        torque_luff=inputs.torque_luff,
         surge=inputs.surge,
         sway=inputs.sway,
         heave=inputs.heave,
@@ -184,62 +142,6 @@ class Sensing(NamedTuple):
     """Longest time that a measurement is held, with its delay. [s]"""
 
 
-class Noise(NamedTuple):
-    """Noise of root mean square 1, of the rope's direction, of roll and of pitch."""
-
-    noise_x: float
-    noise_y: float
-    noise_roll: float
-    noise_pitch: float
-
-
-class Sensed(NamedTuple):
-    """True values and the noise of a measurement of them, which counts if there is one now."""
-
-    swing_x: float
-    swing_y: float
-    rope: float
-    slew: float
-    boom_cos: float
-    boom_sin: float
-    height: float
-    surge: float
-    sway: float
-    heave: float
-    roll: float
-    pitch: float
-    yaw: float
-    noise_x: float
-    noise_y: float
-    noise_roll: float
-    noise_pitch: float
-
-
-@equation
-def sensed(inputs: Sensed, p: Sensing) -> Seen:
-    """What sensors would read at this sample."""
-    return Seen(
-        swing_x=inputs.swing_x + p.rope_angle * inputs.rope * inputs.noise_x,
-        swing_y=inputs.swing_y + p.rope_angle * inputs.rope * inputs.noise_y,
-        rope=inputs.rope,
-        slew=inputs.slew,
-        boom_cos=inputs.boom_cos,
-        boom_sin=inputs.boom_sin,
-        height=inputs.height,
-        surge=inputs.surge,
-        sway=inputs.sway,
-        heave=inputs.heave,
-        roll=inputs.roll + p.motion * inputs.noise_roll,
-        pitch=inputs.pitch + p.motion * inputs.noise_pitch,
-        yaw=inputs.yaw,
-    )
-
-
-sensors = Model(
-    "sensors", parameters=Sensing, state=Stateless, step=stateless, sample=sensed, inputs=Sensed
-)
-
-
 class Samples(NamedTuple):
     """How many samples there have been."""
 
@@ -253,10 +155,11 @@ def counted(state: Samples) -> Samples:
 
 
 class Past(NamedTuple):
-    """Readings of the sensors with those before."""
+    """What is `Seen`, and the noise of a measurement of it, with their past."""
 
     swing_x: History
     swing_y: History
+    swing_z: History
     rope: History
     slew: History
     boom_cos: History
@@ -268,6 +171,16 @@ class Past(NamedTuple):
     roll: History
     pitch: History
     yaw: History
+    noise_x: History
+    noise_y: History
+    """Of the rope's direction; the noise has a root mean square of 1."""
+    noise_roll: History
+    noise_pitch: History
+
+
+READINGS = len(Seen._fields)
+NOISE = Past._fields[READINGS:]
+"""Inputs that are the noise of a measurement."""
 
 
 @equation
@@ -287,28 +200,20 @@ def sample_of(measurement: float, rate: float) -> float:
 
 @equation
 def last_measured(state: Samples, inputs: Past, p: Sensing) -> Seen:
-    """The last measurement that has arrived."""
+    """The last measurement that has arrived, with its noise."""
     arrived = measurement_at(state.number - p.delay, p.rate)
     age = state.number - sample_of(arrived, p.rate)
-    return Seen(
-        swing_x=past(inputs.swing_x, age),
-        swing_y=past(inputs.swing_y, age),
-        rope=past(inputs.rope, age),
-        slew=past(inputs.slew, age),
-        boom_cos=past(inputs.boom_cos, age),
-        boom_sin=past(inputs.boom_sin, age),
-        height=past(inputs.height, age),
-        surge=past(inputs.surge, age),
-        sway=past(inputs.sway, age),
-        heave=past(inputs.heave, age),
-        roll=past(inputs.roll, age),
-        pitch=past(inputs.pitch, age),
-        yaw=past(inputs.yaw, age),
+    true = Seen(*[past(each, age) for each in inputs[:READINGS]])
+    return true._replace(
+        swing_x=true.swing_x + p.rope_angle * true.rope * past(inputs.noise_x, age),
+        swing_y=true.swing_y + p.rope_angle * true.rope * past(inputs.noise_y, age),
+        roll=true.roll + p.motion * past(inputs.noise_roll, age),
+        pitch=true.pitch + p.motion * past(inputs.noise_pitch, age),
     )
 
 
-measured = Model(
-    "measured",
+sensors = Model(
+    "sensors",
     parameters=Sensing,
     state=Samples,
     step=counted,

@@ -19,11 +19,12 @@ from swashplate.crane.axes import RATE, check_names
 from swashplate.crane.closed_loop.operator_command import OperatorCommand
 from swashplate.crane.closed_loop.result import FARTHEST_SWING, CraneRun
 from swashplate.crane.closed_loop.simulating import prepare, simulate
-from swashplate.crane.closed_loop.stepper import Actuation, RunOptions, feels_load
+from swashplate.crane.closed_loop.stepper import Actuation, RunOptions
 from swashplate.crane.control import Clip, Control, Crew
 from swashplate.crane.crane import Crane
 from swashplate.crane.kinematics import Vector, boom_at, rotation, tip_of, to_inertial
 from swashplate.crane.limits import LIMITED
+from swashplate.crane.machines import feels_load, own_drives
 from swashplate.crane.rope import GRAVITY
 from swashplate.crane.sea.seaway import Seaway, Spectrum
 from swashplate.crane.studies.following import follow
@@ -339,7 +340,7 @@ def assumed_sentences(crane: Crane) -> list[str]:
     sentences = []
     if crane.assumed:
         sentences.append(f"{crane.assumed} of the crane are assumed.")
-    if not feels_load(crane):
+    if not any(map(feels_load, own_drives(crane).values())):
         sentences.append("No drive feels the load: they were identified without one.")
     limits = [
         LIMITED[name].label for name, limit in crane.limits.items() if limit.status == "assumed"

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from math import copysign, inf, pi
@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from scipy.signal import StateSpace
 
 Array = NDArray[np.float64]
+BoolArray = NDArray[np.bool_]
 ComplexArray = NDArray[np.complex128]
 Matrices = tuple[Array, Array, Array, Array]
 Response = Callable[[Array], ComplexArray]
@@ -59,7 +60,7 @@ class LinearModel:
     rate: float | None = None
     """Samples a second of a sampled model, None of a continuous one. [Hz]"""
     memory: tuple[str, ...] = ()
-    """States that are inputs of earlier samples."""
+    """States that are earlier samples of inputs, or of signals between parts."""
     units: Mapping[str, str] = field(default_factory=dict)
     """SI units of inputs and outputs by name, as far as they are known."""
     at: Mapping[str, float] = field(default_factory=dict)
@@ -85,12 +86,51 @@ class LinearModel:
 
     @cached_property
     def poles(self) -> ComplexArray:
-        """Poles of the machine, the slowest first; those of delays, all at z = 0, are left out.
+        """Poles of the machine, the slowest first.
 
-        Of a continuous model in the s-plane [rad/s], of a sampled one in the z-plane [1].
+        Those of delays that stand in no loop, all at z = 0, are left out. Of a continuous model in
+        the s-plane [rad/s], of a sampled one in the z-plane [1].
         """
-        machine_states = [name for name in self.states if name not in self.memory]
-        return self.poles_of(*machine_states)
+        if not self.memory:
+            return self.poles_of(*self.states)
+        looped = self._mutual.diagonal()
+        states = zip(self.states, looped, strict=True)
+        return self.poles_of(*[name for name, loops in states if loops or name not in self.memory])
+
+    @cached_property
+    def _mutual(self) -> BoolArray:
+        """(n, n) whether two states act on each other, or a state on itself, at last."""
+        reached = np.not_equal(self.A, 0.0)
+        while True:
+            paths = reached.astype(np.float32)
+            further = np.logical_or(reached, paths @ paths > 0.0)
+            if (further == reached).all():
+                return np.asarray(reached & reached.T)
+            reached = further
+
+    def groups_of(self, members: Sequence[str]) -> list[tuple[str, ...]]:
+        """Members of a joined machine, those that act on each other together.
+
+        The poles of the states of a group are poles of the machine.
+
+        Parameters
+        ----------
+        members : sequence of str
+            Their names, with which the names of their states begin.
+        """
+        rows = {
+            member: [name.startswith(f"{member}.") for name in self.states] for member in members
+        }
+        groups = list[tuple[str, ...]]()
+        left = list(members)
+        while left:
+            group = [left[0]]
+            for member in group:  # which grows
+                others: BoolArray = np.any(self._mutual[rows[member]], axis=0)
+                group += [each for each in left if each not in group and others[rows[each]].any()]
+            groups.append(tuple(member for member in left if member in group))
+            left = [member for member in left if member not in group]
+        return groups
 
     @property
     def is_stable(self) -> bool:
