@@ -5,8 +5,8 @@
     python benchmarks/importers.py importers/bin/python
 
 The importers run in an environment of their own, in which the package need not be: this file calls
-itself there. What is missing there is skipped. Each is given the inputs of a run of the package, one
-sample after the other, and reads all outputs after each step.
+itself there. What is missing there is skipped. Each is given the inputs of a run of the package,
+one sample after the other, and reads all outputs after each step.
 """
 
 import json
@@ -88,7 +88,7 @@ def with_ecos(task: Task) -> Rows:
 
 def load_tbb() -> None:
     """Load the library that ecos is linked with, of the package tbb."""
-    from ctypes import RTLD_GLOBAL, CDLL
+    from ctypes import CDLL, RTLD_GLOBAL
 
     for path in sorted(Path(sys.prefix, "lib").glob("libhwloc.so.15")):
         CDLL(str(path), RTLD_GLOBAL)
