@@ -175,6 +175,33 @@ def crane_at_sea(folder: Path, fmi: str) -> tuple[Task, Rows]:
     return crane_task(folder, fmi, "ss3")
 
 
+def loop_task(folder: Path, fmi: str) -> tuple[Task, Rows]:
+    """The packaged crane in closed loop under the stick of `crane run`, and the run's numbers."""
+    import numpy as np
+
+    from swashplate import export, simulate
+    from swashplate.crane import Crane, OperatorCommand, control, controlled
+    from swashplate.crane import simulate as simulate_crane
+
+    crane = Crane.preset("tg3637")
+    command = OperatorCommand.trapezoid(
+        hoist=-0.2, slew=1.0, luff=0.3, duration=0.5 * SECONDS, length=SECONDS
+    )
+    damped = control.Chain((control.TipShaper("zv"), control.DelayedFeedback(), control.Clip()))
+    closed_loop = simulate_crane(crane, command, control=damped, brake=False)
+    machine = controlled(crane, control=damped, brake=False)
+    path = export.fmu(machine, folder / "crane.fmu", fmi=fmi, platforms=["linux64"])
+    outputs = outputs_of(path)
+    stick = {
+        f"stick.{axis}": column.tolist()
+        for axis, column in zip(("hoist", "slew", "luff"), closed_loop.stick.T, strict=True)
+    }
+    run = simulate(machine, stick, 1.0 / STEP, interpolation="previous")
+    for name in ("load_x", "load_y", "load_z", "hook_x", "tip_z", "rope"):
+        assert np.array_equal(run[f"body.{name}"], closed_loop[name])  # as `crane run` has them
+    return Task(str(path), stick, outputs), rows_of(run, outputs, len(closed_loop.stick))
+
+
 def outputs_of(fmu: Path) -> list[str]:
     """Outputs of an FMU."""
     with zipfile.ZipFile(fmu) as archive:
@@ -192,7 +219,12 @@ def rows_of(run: object, outputs: Sequence[str], count: int) -> Rows:
     return [table[:, n].tolist() for n in range(1, count)]
 
 
-TASKS = {"drive hoist": drive_task, "crane tg3637": crane_task, "crane at sea": crane_at_sea}
+TASKS = {
+    "drive hoist": drive_task,
+    "crane tg3637": crane_task,
+    "crane at sea": crane_at_sea,
+    "crane in closed loop": loop_task,
+}
 FMI = ("2.0", "3.0")
 SHOWN = ("body.tip_z", "body.load_x", "body.load_z", "hoist.shaft_speed", "luff.shaft_speed")
 """Outputs whose differences are shown if there are any."""

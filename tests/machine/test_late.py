@@ -8,7 +8,6 @@ import pytest
 
 from swashplate import InputError, join, linearize, simulate, simulate_many
 from swashplate.errors import EquationError
-from swashplate.export import content_of
 from swashplate.machine import (
     History,
     Machine,
@@ -221,11 +220,6 @@ def test_what_has_no_derivatives_says_so():
         sensitivities(machine, {"law.target": TARGET}, RATE, parameters=["law.gain"])["law.push"]
     with pytest.raises(InputError, match=r"law\.first is what a signal was before the record"):
         sensitivities(closed(forgetful), {"law.target": TARGET}, RATE)["law.push"]
-
-
-def test_what_comes_late_is_not_exported():
-    with pytest.raises(InputError, match=r"law takes 'tank\.level' a sample late.* not exported"):
-        content_of(closed(forgetful), 1.0 / RATE)
 
 
 def test_a_memory_is_a_parameter():
