@@ -27,7 +27,7 @@ from tests.machine.test_late import (
 )
 from tests.marks import rest_slow
 
-from swashplate import InputError, join, simulate
+from swashplate import Drive, InputError, join, simulate
 from swashplate.errors import DomainError
 from swashplate.export import content_of, fmu
 from swashplate.export.c_source import interface
@@ -184,6 +184,47 @@ def test_a_copy_of_the_struct_goes_on_as_the_loop(name, compiled):
     assert model.valid()
     again = [(model.step(*row), model.output(place)) for row in rows[100:]]
     assert went == again
+
+
+class PI(NamedTuple):
+    gain: float = 4.0
+    lag: float = 0.5
+
+
+class Integral(NamedTuple):
+    volts: float = 0.0
+
+
+class Command(NamedTuple):
+    command: float
+    integral: float
+
+
+@equation
+def command(state: Integral, reference: float, speed: float, p: PI, h: float) -> Command:
+    error = reference - speed
+    integral = state.volts + p.gain * error * h / p.lag
+    return Command(min(max(integral + p.gain * error, -10.0), 10.0), integral)
+
+
+@equation
+def kept(signals: Command) -> Integral:
+    return Integral(signals.integral)
+
+
+def test_a_controller_joined_with_a_drive_has_the_bits_of_its_march(compiled):
+    law = Machine(Model("law", PI, Integral, kept, command), PI())
+    links = {"hoist.voltage": "law.command", "law.speed": late("hoist.shaft_speed")}
+    machine = join("closed", {"law": law, "hoist": Drive.preset("hoist")}, links=links)
+    reference = np.repeat([0.5, 1.5, -1.0], 400)
+    run = simulate(machine, {"law.reference": reference}, RATE)
+    assert abs(run["hoist.shaft_speed"][790] - 1.5) < 0.3  # the loop follows
+    model = in_c(machine, compiled)
+    names = ["law.command", "hoist.shaft_speed", "hoist.motor_torque"]
+    places = [model.number("_output", name) for name in names]
+    for n, each in enumerate(reference.tolist()):
+        assert model.step(each) == OK
+        assert [model.output(place) for place in places] == [run[name][n] for name in names]
 
 
 def test_values_before_the_first_sample_are_those_of_the_parameters_then(compiled):
