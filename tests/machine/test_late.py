@@ -8,7 +8,6 @@ import pytest
 
 from swashplate import InputError, join, linearize, simulate, simulate_many
 from swashplate.errors import EquationError
-from swashplate.export import content_of
 from swashplate.machine import (
     History,
     Machine,
@@ -17,6 +16,7 @@ from swashplate.machine import (
     equation,
     late,
     past,
+    root,
     sensitivities,
     stepper,
 )
@@ -89,6 +89,20 @@ def settled(push: float) -> Level:
     return Level(0.3 - 0.5 * push)
 
 
+class Gauge(NamedTuple):
+    first: float
+
+
+class Read(NamedTuple):
+    seen: float
+
+
+@equation
+def read(level: float, p: Gauge) -> Read:
+    return Read(level)
+
+
+gauge = Model("gauge", Gauge, Count, counted, read, settled=at_rest)
 tank = Model("tank", Tank, Level, filled, seen, settled=settled)
 remembering = Model(
     "law", Law, Count, counted, looking_back, taps={"history": Tap("history", longest="memory")}
@@ -126,6 +140,27 @@ def test_a_loop_has_the_numbers_of_one_written_by_hand():
     levels, pushes = by_hand(TARGET)
     np.testing.assert_array_equal(run["tank.level"], levels)
     np.testing.assert_array_equal(run["law.push"], pushes)
+
+
+def test_a_past_needs_no_hold():
+    taps = {"history": Tap("history", longest="memory", hold="none")}
+    law = Model("law", Law, Count, counted, looking_back, taps=taps)
+    run = simulate(closed(law, **{"law.history": LEVEL}), {"law.target": TARGET}, RATE)
+    np.testing.assert_array_equal(run["tank.level"], by_hand(TARGET)[0])
+
+
+def test_each_part_has_its_own_value_before():
+    """One signal comes late to two parts, which state different values before the record."""
+    members = {
+        "law": Machine(forgetful, Law()),
+        "gauge": Machine(gauge, Gauge(-2.0)),
+        "tank": Machine(tank, Tank()),
+    }
+    links = {"tank.push": "law.push", "law.level": LEVEL, "gauge.level": LEVEL}
+    run = simulate(join("loop", members, links=links), {"law.target": TARGET}, RATE)
+    level = run["tank.level"][:-1]
+    np.testing.assert_array_equal(run["gauge.seen"], [-2.0, *level])
+    np.testing.assert_array_equal(run["law.push"], 1.3 * (TARGET - [0.7, *level]))
 
 
 def test_a_stepper_has_the_numbers_of_the_whole_run():
@@ -191,11 +226,6 @@ def test_what_has_no_derivatives_says_so():
         sensitivities(closed(forgetful), {"law.target": TARGET}, RATE)["law.push"]
 
 
-def test_what_comes_late_is_not_exported():
-    with pytest.raises(InputError, match=r"law takes 'tank\.level' a sample late.* not exported"):
-        content_of(closed(forgetful), 1.0 / RATE)
-
-
 def test_a_memory_is_a_parameter():
     with pytest.raises(InputError, match="longest delay of 'history' is 'long', .* gain, first"):
         Model(
@@ -206,6 +236,23 @@ def test_a_memory_is_a_parameter():
             looking_back,
             taps={"history": Tap("history", longest="long")},
         )
+
+
+@equation
+def misses(x: float, history: History) -> float:
+    return x - past(history, 3.0)
+
+
+@equation
+def searched(history: History) -> Push:
+    return Push(root(misses, -9.0, 9.0, history))
+
+
+def test_a_loop_within_an_equation_has_no_past():
+    taps = {"history": Tap("history", longest="memory")}
+    law = Model("law", Law, Count, counted, searched, taps=taps)
+    with pytest.raises(EquationError, match="past in misses, .* read the past before"):
+        simulate(Machine(law, Law()), {"history": TARGET}, RATE)
 
 
 @equation

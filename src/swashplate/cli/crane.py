@@ -17,11 +17,11 @@ from swashplate.cli.crane_options import (
     Operated,
     Studied,
     WithLoad,
-    control_of,
     crane_of,
     named_numbers,
     number_of,
     sea_sentences,
+    variant_of,
 )
 from swashplate.cli.exports import ExportFiles
 from swashplate.cli.machines import OwnMachine
@@ -188,10 +188,7 @@ def run(
         )
         ship = seaway or operated.motion(round(command.length * RATE) + 1)
         for variant_name in variants:
-            drives, _, controller = variant_name.partition(":")
-            options = operated.run_options
-            options["control"] = control_of(controller)
-            options["actuation"] = "inverse" if drives == "identified" else drives
+            options = operated.run_options | variant_of(variant_name)
             runs[variant_name] = simulate(crane, command, sea=ship, brake=brake, **options)
         tables = run_tables(runs)
     save(out, "All signals, in SI", runs[variants[-1]].write)
@@ -548,6 +545,7 @@ def damping(
     examples="""
         swashplate crane export tg3637 --fmu crane.fmu
         swashplate crane export tg3637 --at rope_m=27 --c crane --compile
+        swashplate crane export tg3637 --variant inverse:feedback=0.2+clip --fmu damped.fmu
         swashplate crane export mine.toml --drive luff=fitted --fmu crane.fmu --platforms linux64
     """,
     units=False,
@@ -556,6 +554,17 @@ def export_crane(
     hanging: WithLoad,
     files: ExportFiles,
     *,
+    variant: Annotated[
+        str | None,
+        typer.Option(
+            metavar="DRIVES[:CONTROL]",
+            help=(
+                "Export the crane in closed loop, from the stick on: command of the drives and, "
+                "after a colon, control, as in 'swashplate crane run' (default: the drives' "
+                "voltages are inputs, and there is no controller)."
+            ),
+        ),
+    ] = None,
     brake: Annotated[
         bool,
         typer.Option("--brake/--no-brake", metavar=NO_VALUE, help="Brake the hoist at rest."),
@@ -564,16 +573,22 @@ def export_crane(
     """Export a crane with its drives as FMU, C source or WebAssembly.
 
     Inputs are the voltages of the three drives and the ship's motion: surge,
-    sway, heave in m, roll, pitch, yaw in rad. Outputs are the signals of the
-    drives, and tip, load, hook, rope, swing and tension. It has no controller.
-    It is compiled when it is exported.
+    sway, heave in m, roll, pitch, yaw in rad. With --variant they are the stick's
+    positions, -1 to 1, in place of the voltages, and with sensors their noise.
+    Outputs are the signals of the drives, and tip, load, hook, rope, swing and
+    tension, and with --variant those of control. It is compiled when it is
+    exported.
     """
     files.check(force=hanging.force)
     with spinner("Exporting"):
-        from swashplate.crane import RATE, plant
+        from swashplate.crane import RATE, controlled, plant
 
         crane = hanging.loaded_crane
-        machine = plant(crane, brake=brake, **hanging.run_options)
+        options = hanging.run_options | {"brake": brake}
+        if variant is None:
+            machine = plant(crane, **options)
+        else:
+            machine = controlled(crane, **options | variant_of(variant))
     files.write(machine, 1.0 / RATE)
     for sentence in crane.provenance():
         say(sentence)

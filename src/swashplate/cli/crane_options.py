@@ -457,6 +457,13 @@ def control_of(text: str) -> Control | None:
     return control.Chain(tuple(stages)) if stages else None
 
 
+def variant_of(text: str) -> dict[str, Any]:
+    """Options of a run of a text such as ``inverse:zv-tip``: drives and control."""
+    drives, _, controller = text.partition(":")
+    actuation = "inverse" if drives == "identified" else drives
+    return {"control": control_of(controller), "actuation": actuation}
+
+
 def _sensors(noise_deg: float = 0.1, delay: float = 0.05, rate: float = 50.0) -> Control:
     """Sensors by the noise of the rope's angle [deg], delay [s] and rate [Hz]."""
     from swashplate.crane.control import Sensors

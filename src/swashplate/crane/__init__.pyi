@@ -9,6 +9,7 @@ from .closed_loop.result import run_tables as run_tables
 from .closed_loop.simulating import simulate as simulate
 from .closed_loop.stepper import CraneStepper as CraneStepper
 from .closed_loop.stepper import RunOptions as RunOptions
+from .closed_loop.stepper import controlled as controlled
 from .crane import Crane as Crane
 from .crane import preset_text as preset_text
 from .drives import UNUSABLE as UNUSABLE

@@ -19,7 +19,7 @@ from swashplate.drive import (
     Sample,
 )
 from swashplate.errors import FileError, InputError, InputTypeError
-from swashplate.export.c_source import Exported, interface, numbers, writer_of
+from swashplate.export.c_source import Exported, interface, numbers, rooms_of, writer_of
 from swashplate.export.variable_list import (
     DRIVE,
     DRIVE_OPTIONS,
@@ -177,18 +177,17 @@ def content_of(what: Drive | Machine, step: float, *, prefix: str = "swp") -> Co
         )
     machine.check_step(step)
     for part in machine.model.parts:
-        for tap in part.taps.values():
-            if tap.late or tap.longest:
+        for name in part.defaults:
+            if part.tap(name).longest and part.tap(name).signal in machine.model.external:
                 raise InputError(
-                    f"{machine.name}: {part.path} takes '{part.wired.get(tap.signal, tap.signal)}' "
-                    "a sample late, or looks back at an age that changes. This is not exported: "
-                    "export the machine without its control, as crane.plant."
+                    f"{machine.name}: {part.path} looks back at '{part.tap(name).signal}', for "
+                    "which a parameter stands. This is not exported: leave out the default."
                 )
     if isinstance(machine, Drive):  # its names and value references never change
         exported = exported_drive(machine)
         references, descriptions = DRIVE, DRIVE_OPTIONS | descriptions_of(exported)
     else:
-        exported = Exported(machine.model, prefix)
+        exported = Exported(machine.model, prefix, reaches=rooms_of(machine, step))
         references, descriptions = OWN, descriptions_of(exported)
     return Content(
         exported=exported,

@@ -139,7 +139,7 @@ def fmu(
 def exportable(what: Drive | Machine, step: float) -> Content:
     """What runs at a step, its delays checked; see `content_of`."""
     content = content_of(what, step)
-    for part_index, _, _, tap, _ in content.exported.taps:
+    for part_index, _, _, tap, _ in content.exported.windows:
         delay = value_at(content.machine.parts[part_index].p, tap.delay) if tap.delay else 0.0
         if delay > LONGEST_LINE * step:
             raise InputError(

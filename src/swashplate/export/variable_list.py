@@ -153,7 +153,8 @@ def variables(
         for index, part in enumerate(exported.model.parts)
         for entry, path in _declared(part.parameters)
     }
-    delays = {(part, tap.delay) for part, _, _, tap, _ in exported.taps}
+    farthest = {(tap.part, tap.tap.delay): LONGEST_LINE for tap in exported.windows}
+    farthest |= {(tap.part, tap.tap.longest): exported.reach(tap) for tap in exported.histories}
     for index, (part_number, path, name) in enumerate(parameters):
         if defaults.get(name) == name:  # an input of that name has its value
             continue
@@ -162,8 +163,8 @@ def variables(
         variable = _parameter(
             unique_name, references.PARAMETER + index, definition, path, starts[name]
         )
-        if (part_number, path) in delays:
-            most = LONGEST_LINE * values[0]
+        if (part_number, path) in farthest:
+            most = farthest[part_number, path] * values[0]
             variable = replace(variable, upper=min(variable.upper or most, most))
         listed.append(variable)
     longest = exported.model.longest if isfinite(exported.model.longest) else None

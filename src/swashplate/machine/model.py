@@ -144,6 +144,12 @@ class Tap(NamedTuple):
             return 1
         return 3 if self.hold == "mean" else 2
 
+    @property
+    def passed_on(self) -> bool:
+        """Whether nothing is read but the sample before, which one sample passes on to the next."""
+        plain = self.hold == "none" and not (self.width or self.longest or self.delay)
+        return plain and self.late == 1
+
 
 def type_of_input(tap: Tap) -> type[Any]:
     """What an equation is given of a signal that is looked at in this way."""
@@ -410,6 +416,14 @@ class Model:
                 for source in link.sources if link is not None else ():
                     needed[source.part] = needed[source.part]._replace(gives=True)
         return tuple(needed)
+
+    def line(self, part: int, name: str) -> str:
+        """Name of the line in which the past of a signal between parts is kept for an input.
+
+        Inputs with values of their own before the record have lines of their own.
+        """
+        tap = self.parts[part].tap(name)
+        return f"{tap.signal} {self.prefix(part)}{tap.before}" if tap.before else tap.signal
 
     def prefix(self, part: int) -> str:
         """What stands before a part's paths: where it stands and a dot, in a joined model."""

@@ -55,7 +55,7 @@ NO_NUMBER, ROPE_OUT, BOOM_OUT, TOO_FAST = "number", "rope", "boom", "fast"
 
 
 class RunOptions(Placing, total=False):
-    """Options of a run: keywords of `simulate` and `CraneStepper`, each optional.
+    """Options of a run: keywords of `simulate`, `controlled` and `CraneStepper`, each optional.
 
     Those of `Placing` say where the crane begins and what hangs on it; these what moves it.
 
@@ -131,12 +131,7 @@ class CraneStepper:
     """
 
     def __init__(self, crane: Crane, **options: Unpack[RunOptions]) -> None:
-        keywords: dict[str, Any] = dict(options)
-        check_names("A crane's run has no", keywords, RunOptions.__annotations__, "it has")
-        try:
-            prepared = _prepared(crane, tuple(keywords.items()))
-        except TypeError:  # a list, or another option without a hash
-            prepared = _prepared.__wrapped__(crane, tuple(keywords.items()))
+        prepared = _prepared_of(crane, dict(options))
         self._crane = crane
         self.fixed, self._machine, self._outputs, self._given, self._seed = prepared
         self._direct = self.fixed.actuation == "direct"
@@ -299,6 +294,50 @@ class CraneStepper:
             "luff less, or start elsewhere",
         }
         return DomainError(f"{crane.name}: at {time:.2f} s {reasons[reason]}.")
+
+
+def controlled(crane: Crane, **options: Unpack[RunOptions]) -> Machine:
+    """A crane under control as a machine: what `simulate` marches, from the stick on.
+
+    Parameters
+    ----------
+    crane : Crane
+        The crane with its drives.
+    **options
+        Where it begins, what controls it, what hangs on it: see `RunOptions`.
+
+    Returns
+    -------
+    Machine
+        Inputs are ``stick.hoist``, ``stick.slew``, ``stick.luff``, -1 to 1, or the voltages of the
+        drives with direct actuation; the ship's motion, ``body.surge`` [m] to ``body.yaw`` [rad],
+        which may be left out; and with sensors ``sensors.noise_x`` and others, white noise of root
+        mean square 1 at each measurement, or 0. Signals are those of control, drives and `body`.
+        Ends of travel and a slack rope, which stop a run, are limits of the body.
+
+    Raises
+    ------
+    InputError
+        As of `simulate`.
+
+    Examples
+    --------
+    >>> from swashplate.crane import Crane, control, controlled
+    >>> damped = controlled(Crane.preset("tg3637"), control=control.DelayedFeedback(0.2))
+    >>> [name for name in damped.ports.external if name.startswith("stick.")]
+    ['stick.hoist', 'stick.slew', 'stick.luff']
+    """
+    return _prepared_of(crane, dict(options)).machine
+
+
+def _prepared_of(crane: Crane, options: dict[str, Any]) -> _Prepared:
+    """What runs with these options share, found again if it was asked for before."""
+    check_names("A crane's run has no", options, RunOptions.__annotations__, "it has")
+    try:
+        return _prepared(crane, tuple(options.items()))
+    except TypeError:  # a list, or another option without a hash
+        prepared: _Prepared = _prepared.__wrapped__(crane, tuple(options.items()))
+        return prepared
 
 
 class _Prepared(NamedTuple):

@@ -1,6 +1,7 @@
 from .equation import EquationInC as EquationInC
 from .equation import equation_in_c as equation_in_c
 from .exported import Exported as Exported
+from .exported import rooms_of as rooms_of
 from .model import feedthrough as feedthrough
 from .model import newest as newest
 from .model import numbers as numbers

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
+from math import ceil
 from typing import NamedTuple
 
 from swashplate.export.c_source.names import (
@@ -16,10 +17,16 @@ from swashplate.export.c_source.names import (
     PART_MEMBERS,
     PUBLIC,
 )
-from swashplate.machine import Equation, Model
+from swashplate.machine import Equation, Machine, Model
 from swashplate.machine.code_generation import ascii_name, c_name, fresh_name
-from swashplate.machine.fields import floats_of
+from swashplate.machine.fields import floats_of, value_at
 from swashplate.machine.marching import TapOf, signals_between, taps_of
+
+USUAL_RING = 1024
+"""Samples of a ring of a model without numbers."""
+BEYOND = 3
+"""Samples of a ring beyond those by which it is looked back: the newest one, and the next older one
+of an age between two."""
 
 
 class ExportedLimit(NamedTuple):
@@ -47,6 +54,8 @@ class Exported:
     """Signals that can be read; by default all."""
     notes: Mapping[str, str] = field(default_factory=dict)
     """What an external signal is, if no named tuple of inputs says it."""
+    reaches: tuple[int, ...] = ()
+    """Samples of each ring in `rings`: how far back it is looked."""
 
     @property
     def file(self) -> str:
@@ -238,20 +247,66 @@ class Exported:
         return taps_of(self.model, self.model.external)
 
     @cached_property
+    def windows(self) -> tuple[TapOf, ...]:
+        """Taps that look at neighbouring samples in a delay line."""
+        return tuple(tap for tap in self.taps if not (tap.tap.passed_on or tap.tap.longest))
+
+    @cached_property
     def lines(self) -> tuple[str, ...]:
         """External signals that are kept in delay lines; those between parts come after them."""
-        return tuple(dict.fromkeys(tap.tap.signal for tap in self.taps if tap.between < 0))
+        return tuple(dict.fromkeys(tap.tap.signal for tap in self.windows if tap.between < 0))
+
+    @cached_property
+    def _lines_between(self) -> tuple[int, ...]:
+        """Signals between parts that are kept in delay lines, by `TapOf.between`."""
+        return tuple(dict.fromkeys(tap.between for tap in self.windows if tap.between >= 0))
 
     @cached_property
     def line_count(self) -> int:
         """Delay lines of all signals."""
-        return len(self.lines) + len(signals_between(self.model))
+        return len(self.lines) + len(self._lines_between)
 
     def line_of(self, tap: TapOf) -> int:
         """Number of the line that a tap reads."""
         if tap.between < 0:
             return self.lines.index(tap.tap.signal)
-        return len(self.lines) + tap.between
+        return len(self.lines) + self._lines_between.index(tap.between)
+
+    @cached_property
+    def histories(self) -> tuple[TapOf, ...]:
+        """Taps that look back at an age that changes."""
+        return tuple(tap for tap in self.taps if tap.tap.longest)
+
+    @cached_property
+    def rings(self) -> tuple[str | int, ...]:
+        """Signals that these look at: external ones by name, others by `TapOf.between`."""
+        return tuple(dict.fromkeys(_looked_at(tap) for tap in self.histories))
+
+    @property
+    def ring_sizes(self) -> tuple[int, ...]:
+        """Samples of each ring."""
+        return self.reaches or (USUAL_RING,) * len(self.rings)
+
+    def reach(self, tap: TapOf) -> int:
+        """Samples that a tap can look back in its ring, its delay included."""
+        return self.ring_sizes[self.ring_of(tap)] - BEYOND + 1 - tap.tap.late
+
+    def ring_of(self, tap: TapOf) -> int:
+        """Number of the ring that a tap looks back in."""
+        return self.rings.index(_looked_at(tap))
+
+    @cached_property
+    def registers(self) -> dict[int, str]:
+        """Name within the structs of each signal that a sample passes on, by `TapOf.between`."""
+        used_names = {*MEMBERS.split(), *self.members}
+        used_names |= {
+            f"{name}{ending}" for name in self.integrals.values() for ending in ("", "_rate")
+        }
+        names = signals_between(self.model)
+        late = dict.fromkeys(tap.between for tap in self.taps if tap.tap.passed_on)
+        return {
+            between: _fresh_member(f"late {names[between]}", ("",), used_names) for between in late
+        }
 
     @property
     def settles(self) -> bool:
@@ -263,7 +318,26 @@ class Exported:
     @cached_property
     def widest(self) -> int:
         """Samples of the widest window."""
-        return max([tap.tap.samples for tap in self.taps], default=3)
+        return max([tap.tap.samples for tap in self.windows], default=3)
+
+
+def rooms_of(machine: Machine, step: float) -> tuple[int, ...]:
+    """Samples of each of an exported machine's rings: as far as its numbers look back at a step."""
+    model = machine.model
+    rooms = dict[str | int, int]()
+    for tap in taps_of(model, model.external):
+        if tap.tap.longest:
+            p = machine.parts[tap.part].p
+            delay = float(value_at(p, tap.tap.delay)) if tap.tap.delay else 0.0
+            ages = delay / step + float(value_at(p, tap.tap.longest)) / step
+            key = _looked_at(tap)
+            rooms[key] = max(rooms.get(key, 0), ceil(ages) + tap.tap.late + BEYOND)
+    return tuple(rooms.values())
+
+
+def _looked_at(tap: TapOf) -> str | int:
+    """The signal that a tap looks at: an external one by name, others by number."""
+    return tap.tap.signal if tap.between < 0 else tap.between
 
 
 def _flat(name: str) -> str:
@@ -273,7 +347,7 @@ def _flat(name: str) -> str:
 
 def _fresh_member(name: str, endings: Iterable[str], used_names: set[str]) -> str:
     """Name of members that differ in their endings, none of which is taken."""
-    member = c_name(name)
+    member = c_name(name.replace(" ", "_"))
     while any(f"{member}{ending}" in used_names for ending in endings):
         member += "_"
     used_names |= {f"{member}{ending}" for ending in endings}

@@ -47,6 +47,10 @@ class Layout:
         where = f"m->{member}_signals" if inside else f"m->{state}.{member}"
         return f"{where}.{path_of(source.signal)}"
 
+    def parameter(self, part: int, path: str) -> str:
+        """Where a parameter of a part stands."""
+        return f"m->{self.exported.members[part]}.{path_of(path)}"
+
     def value_of(self, signal: str) -> str:
         """Where the newest value of an external signal stands."""
         if signal in self.exported.measured:

@@ -33,7 +33,14 @@ from swashplate.machine.code_generation import (
 from swashplate.machine.fields import declared_by, value_at
 from swashplate.machine.graph import names_in
 from swashplate.machine.language import parsed
-from swashplate.machine.marching import CodeForm, SampleCode, TapOf, output_of
+from swashplate.machine.marching import (
+    MOST_PASSES,
+    SETTLED,
+    CodeForm,
+    SampleCode,
+    TapOf,
+    output_of,
+)
 from swashplate.machine.model import arguments_of
 
 Array = NDArray[np.float64]
@@ -129,7 +136,7 @@ class Writer:
     ) -> tuple[list[str], list[str]]:
         """Declarations of what a part sees through its taps, and their names."""
         lines, names = [], []
-        for tap in part.part.taps:
+        for tap in part.windows:
             line = self.exported.line_of(tap)
             seen = f"read_window(m, {tap.number}, {line}, {tap.tap.samples})"
             text = f"constant_window(m->before_record[{line}])" if constant else seen
@@ -144,15 +151,13 @@ class Writer:
         used_names = {*self.loops.used_names}
         margins = any(part.part.margin is not None for part in self.parts)
         for part in self.parts:
-            body += [
-                f"m->line[{self.exported.line_of(tap)}][m->newest] = {self._linked(tap)};"
-                for tap in part.part.between
-            ]
+            body += [self._kept(tap) for tap in part.part.between if not tap.tap.late]
             lines, windows = self._windows(part, used_names, constant=False)
             arguments = ["m", f"&m->now.{part.member}", *windows]
             call = f"{part.names['sample']}({', '.join(arguments)})"
             holds = part.part.margin is not None
             body += [*lines, f"good = {call} && good;" if holds else f"{call};"]
+        body += dict.fromkeys(self._kept(tap) for tap in self.late)
         for name, signal in self.model.integrals.items():
             rate = self.output(signal)
             integral = self.exported.integrals[name]
@@ -170,10 +175,88 @@ class Writer:
         head = f"static int one_sample({self.exported.type} *m)"
         return c_function(description, head, body)
 
+    @property
+    def late(self) -> list[TapOf]:
+        """Taps on signals between parts that come later, in the order of the parts."""
+        return [tap for part in self.parts for tap in part.part.between if tap.tap.late]
+
+    def _kept(self, tap: TapOf) -> str:
+        """A statement that keeps what a tap reads later of a signal between parts, at a sample."""
+        return self._put(tap, self._linked(tap), "m->line[{}][m->newest] = {};", "put_past")
+
+    def _put(self, tap: TapOf, value: str, in_line: str, in_ring: str) -> str:
+        """A statement that puts a value where a tap reads it."""
+        exported = self.exported
+        if tap.tap.passed_on:
+            return f"m->now.{exported.registers[tap.between]} = {value};"
+        if tap.tap.longest:
+            return f"{in_ring}(m, {exported.ring_of(tap)}, {value});"
+        return in_line.format(exported.line_of(tap), value)
+
+    def _held(self, tap: TapOf, value: str) -> list[str]:
+        """Statements after which a signal between parts has always had a value."""
+        lines = [self._put(tap, value, "fill_line(m, {}, {});", "fill_past")]
+        if tap.tap.passed_on:
+            register = self.exported.registers[tap.between]
+            lines.append(f"m->before.{register} = m->now.{register};")
+        return lines
+
+    def _before(self, tap: TapOf) -> str:
+        """What a signal between parts was before the first sample, at rest."""
+        return self.layout.parameter(tap.part, tap.tap.before) if tap.tap.before else "0.0"
+
     def _starts(self, settled: bool) -> list[str]:
         """States at the first sample, at rest or settled: of each part, and of all."""
-        word = "settled" if settled else "rest"
         texts = [part.start(settled) for part in self.parts]
+        body = self._passed(settled, texts)
+        description = "settled under what it was given" if settled else "at rest"
+        name = "settled_start" if settled else "rested_start"
+        returned = "void"
+        if settled and self.late:
+            returned, body = "bool", self._until_settled(body)
+        elif not settled:
+            stated = [tap for part in self.parts for tap in part.part.between]
+            stated = [tap for tap in stated if tap.tap.before or tap.tap.passed_on]
+            ahead = [line for tap in stated for line in self._held(tap, self._before(tap))]
+            body = [*dict.fromkeys(ahead), *body]
+        head = f"static {returned} {name}({self.exported.type} *m)"
+        return [*texts, c_function(f"States before the first sample, {description}.", head, body)]
+
+    def _until_settled(self, body: Sequence[str]) -> list[str]:
+        """Statements of passes over the parts until what comes late no longer changes."""
+        late = {tap.between: tap for tap in self.late}
+        values, found = (
+            ", ".join(map(text, late.values())) for text in (self._before, self._linked)
+        )
+        place, count = {between: index for index, between in enumerate(late)}, len(late)
+        held = [
+            line
+            for tap in self.late
+            for line in self._held(tap, f"late_values[{place[tap.between]}]")
+        ]
+        change = "fabs(found_values[i] - late_values[i])"
+        return [
+            f"double late_values[{count}] = {{{values}}};",
+            f"double largest_values[{count}] = {{0.0}};",
+            f"for (int passes = 0; passes < {MOST_PASSES}; passes++) {{",
+            *(f"    {line}" for line in [*dict.fromkeys(held), *body]),
+            f"    const double found_values[{count}] = {{{found}}};",
+            "    bool is_settled = true;",
+            f"    for (int i = 0; i < {count}; i++) {{",
+            "        largest_values[i] = greater_of(largest_values[i], fabs(found_values[i]));",
+            f"        is_settled = is_settled && {change} <= {SETTLED!r} * largest_values[i];",
+            "        late_values[i] = found_values[i];",
+            "    }",
+            "    if (is_settled) {",
+            "        return true;",
+            "    }",
+            "}",
+            "return false; /* the parts act back on each other and do not settle */",
+        ]
+
+    def _passed(self, settled: bool, texts: Sequence[str]) -> list[str]:
+        """Statements that give each part its state at the start, in the order of the flow."""
+        word = "settled" if settled else "rest"
         body: list[str] = []
         used_names = {*self.loops.used_names}
         for index, part in enumerate(self.parts):
@@ -183,7 +266,8 @@ class Writer:
             later = "\n".join(texts[index + 1 :])
             if settled:
                 filled = [line for each in self.parts[index + 1 :] for line in self._filled(each)]
-                later = "\n".join([later, *filled])
+                later = "\n".join([later, *filled, *map(self._linked, self.late)])
+            later = "\n".join([later, *self._links_in(later)])
             if f"m->{part.member}_signals" in later or f"m->before.{part.member}." in later:
                 lines, windows = self._windows(part, used_names, constant=True)
                 following = fresh_name(f"{part.member}_next", used_names)
@@ -194,23 +278,24 @@ class Writer:
                     f"struct {self.tags[index]['state']} {following}; /* not needed */",
                     f"{part.names['sample']}({arguments});",
                 ]
-        what = "settled under what it was given" if settled else "at rest"
-        head = f"static void {'settled' if settled else 'rested'}_start({self.exported.type} *m)"
-        return [*texts, c_function(f"States before the first sample, {what}.", head, body)]
+        return body
+
+    def _links_in(self, text: str) -> Iterator[str]:
+        """Texts of the signals of several parts that a text calls."""
+        for name, function_name in self._link_names.items():
+            if f"{function_name}(m)" in text:
+                yield self.links[name]
 
     def _filled(self, part: PartInC) -> list[str]:
         """Statements that fill the lines of signals between parts with what they are."""
-        return [
-            f"fill_line(m, {self.exported.line_of(tap)}, {self._linked(tap)});"
-            for tap in part.part.between
-        ]
+        taps = [tap for tap in part.part.between if not tap.tap.late]
+        return [line for tap in taps for line in self._held(tap, self._linked(tap))]
 
     def _updates(self) -> str:
         """What follows from parameters and step: options, constants, places of the taps."""
         texts: list[str] = []
         options: list[str] = []
         checks: list[str] = []
-        misplaced: list[str] = []
         for (part_index, name), equation in self.exported.follows.items():
             member = self.exported.members[part_index]
             function_name = self.loops.fresh(f"{member}_{name}")
@@ -224,15 +309,7 @@ class Writer:
                 f"    return {self.P}_UNSTABLE;",
                 "}",
             ]
-        for part_index, _, number, tap, _ in self.exported.taps:
-            delay = (
-                f"m->{self.exported.members[part_index]}.{path_of(tap.delay)}"
-                if tap.delay
-                else "0.0"
-            )
-            misplaced.append(
-                f"!place_tap(m, {number}, {delay}, {c_literal(float(tap.ahead))}, {tap.samples})"
-            )
+        misplaced = [self._misplaced(tap) for tap in self.exported.taps if not tap.tap.passed_on]
         if misplaced:
             test = f"if ({' || '.join(misplaced)}) {{"
             checks += [test, f"    return {self.P}_BAD_DELAY;", "}"]
@@ -251,6 +328,19 @@ class Writer:
         calls = [f"{part.names['constants']}(m);" for part in parts_with_constants] or ["(void)m;"]
         texts.append(c_function(description, f"{head}({self.exported.type} *m)", calls))
         return "\n\n".join(texts)
+
+    def _misplaced(self, tapped: TapOf) -> str:
+        """A test whether a tap reads beyond its line; it sets where it reads."""
+        part, _, number, tap, _ = tapped
+        delay = self.layout.parameter(part, tap.delay) if tap.delay else "0.0"
+        ahead = c_literal(float(tap.ahead))
+        if tap.longest:
+            longest = self.layout.parameter(part, tap.longest)
+            ring = self.exported.ring_of(tapped)
+            return f"!place_past(m, {number}, {ring}, {delay}, {ahead}, {tap.late}, {longest})"
+        if tap.late:
+            return f"!place_late(m, {number}, {delay}, {ahead}, {tap.samples}, {tap.late})"
+        return f"!place_tap(m, {number}, {delay}, {ahead}, {tap.samples})"
 
     def _finite_states(self) -> str:
         """Whether all states are finite: without a branch for each."""
@@ -443,4 +533,6 @@ def _delay(tapped: TapOf, instance: Machine) -> float:
 
 def _is_newest(tapped: TapOf, instance: Machine, step: float) -> bool:
     """Whether a tap reads the newest sample of its signal."""
+    if tapped.tap.late:
+        return False
     return _delay(tapped, instance) < (1.0 + tapped.tap.ahead) * step * (1.0 - 1e-12)

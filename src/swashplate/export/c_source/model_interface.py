@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from math import inf, isfinite
 
-from swashplate.export.c_source.exported import Exported
+from swashplate.export.c_source.exported import BEYOND, Exported
 from swashplate.export.c_source.layout import path_of
 from swashplate.export.c_source.model import writer_of
 from swashplate.export.c_source.structs import noted, with_comment
@@ -149,6 +149,9 @@ class _Interface:
         lines = [f"struct {exported.prefix}_memory {{ /* what changes from sample to sample */"]
         for member, part_tags in zip(exported.members, tags, strict=True):
             lines.append(f"    struct {part_tags['state']} {member};")
+        lines += [
+            f"    double {name}; /* of the sample before */" for name in exported.registers.values()
+        ]
         for name in exported.integrals.values():
             lines += [f"    double {name};", f"    double {name}_rate;"]
         lines += ["    bool started; /* a sample was taken */", "};", ""]
@@ -173,14 +176,24 @@ class _Interface:
         lines.append(
             f"    struct {exported.prefix}_memory now, before; /* before the last sample */"
         )
-        if exported.taps:
-            count, rows = len(exported.taps), exported.line_count
+        count, rows = len(exported.taps), exported.line_count
+        if exported.windows or exported.histories:
             lines += [
                 f"    int whole[{count}];       /* samples by which taps look back */",
                 f"    double fraction[{count}]; /* and the rest of one */",
+            ]
+        if exported.windows:
+            lines += [
                 f"    double line[{rows}][{self.P}_LINE]; /* what taps read, a ring for each */",
                 f"    double before_record[{rows}]; /* what they were before the first sample */",
                 "    int newest; /* place of the newest sample */",
+            ]
+        if exported.histories:
+            count, total = len(exported.rings), sum(exported.ring_sizes)
+            lines += [
+                f"    double past[{total}]; /* what is looked back at: a ring behind the other */",
+                f"    double past_before[{count}]; /* what it was before the first sample */",
+                f"    int past_newest[{count}]; /* place of the newest sample in each ring */",
             ]
         lines.append("    bool stale;   /* what follows from parameters is to be computed */")
         lines.append("    bool settled; /* the start is not at rest */")
@@ -196,7 +209,9 @@ class _Interface:
             self.filled(TEXTS["top"]),
             "\n".join(self.helpers(core)),
             self.filled(TEXTS["numbers"]),
-            *([self.filled(TEXTS["lines"])] if exported.taps else []),
+            *([self.filled(TEXTS["lines"])] if exported.windows else []),
+            *([self.filled(TEXTS["late"])] if "place_late(" in core else []),
+            *([self.filled(TEXTS["past"], rings=self.rings())] if exported.histories else []),
             *([self.filled(TEXTS["constant"])] if "constant_window(" in core else []),
             "/* --- the model " + "-" * 80 + " */\n",
             core + "\n",
@@ -206,7 +221,8 @@ class _Interface:
             self.switched(),
             self.filled(
                 TEXTS["interface"],
-                settle=self.filled(TEXTS["settled"]) if exported.settles else "",
+                settle=self.settled() if exported.settles else "",
+                too_far=self.too_far(),
                 constants=self.constants(),
                 cleared=self.cleared(),
                 move=self.advance_line(),
@@ -221,7 +237,8 @@ class _Interface:
         """What the equations call, and the lines."""
         called = helpers_in(core)
         greater_of = HELPERS["greater_of"]
-        if self.exported.taps and greater_of not in called:
+        reads_lines = self.exported.windows or self.exported.histories
+        if reads_lines and greater_of not in called:
             called.append(greater_of)
         return called
 
@@ -241,7 +258,11 @@ class _Interface:
         initial = [self.exported.arguments.get(signal, "0.0") for signal in signals]
         initial += ["0.0"] * (self.exported.line_count - len(signals))
         lines += [f"fill_line(m, {row}, {text});" for row, text in enumerate(initial)]
-        return _body([*lines, *(["m->newest = 0;"] if initial else [])] or ["(void)m;"])
+        lines += ["m->newest = 0;"] if initial else []
+        for ring, signal in enumerate(self.exported.rings):
+            text = self.exported.arguments.get(str(signal), "0.0")
+            lines.append(f"fill_past(m, {ring}, {text});")
+        return _body(lines or ["(void)m;"])
 
     def bounds(self) -> str:
         tests = []
@@ -262,12 +283,38 @@ class _Interface:
         lines = [f"m->inputs.{name} = {name};" for name in self.arguments]
         for row, signal in enumerate(self.exported.lines):
             lines.append(f"m->line[{row}][m->newest] = {self.writer.layout.value_of(signal)};")
+        for ring, looked_at in enumerate(self.exported.rings):
+            if isinstance(looked_at, str):
+                lines.append(f"put_past(m, {ring}, {self.writer.layout.value_of(looked_at)});")
         return _body(lines or ["(void)m;"])
 
     def advance_line(self) -> str:
-        if not self.exported.line_count:
-            return ""
-        return f"    m->newest = m->newest > 0 ? m->newest - 1 : {self.P}_LINE - 1;\n"
+        lines = ""
+        if self.exported.line_count:
+            lines += f"    m->newest = m->newest > 0 ? m->newest - 1 : {self.P}_LINE - 1;\n"
+        return lines + ("    move_rings(m);\n" if self.exported.rings else "")
+
+    def settled(self) -> str:
+        """The function that settles a model."""
+        starts = "settled_start(m);"
+        if self.writer.late:
+            failed = [f"if (!{starts[:-1]}) {{", f"    return {self.P}_DOMAIN;", "}"]
+            starts = "\n".join(indented(failed)).lstrip()
+        return self.filled(TEXTS["settled"], starts=starts)
+
+    def too_far(self) -> str:
+        """What a delay beyond its line demands."""
+        if not self.exported.rings:
+            return f"compile with a larger {self.P}_LINE"
+        return f"compile with a larger {self.P}_LINE, or export it with the longest past"
+
+    def rings(self) -> str:
+        """Lines that say where each ring begins, and how long it is."""
+        begin, lines = 0, list[str]()
+        for size in self.exported.ring_sizes:
+            lines.append(f"{{{begin}, {size}}},")
+            begin += size
+        return _body(lines)
 
     def tables(self) -> str:
         """Values with their places and ranges, places of options, names."""
@@ -353,9 +400,15 @@ class _Interface:
         """Whether taps and the newest sample lie within their lines."""
         most = f"{self.P}_LINE - {{}}"
         ends = [
-            (f"m->whole[{tap.number}]", most.format(tap.tap.samples)) for tap in self.exported.taps
+            (f"m->whole[{tap.number}]", most.format(tap.tap.samples))
+            for tap in self.exported.windows
         ]
         ends += [("m->newest", most.format(1))] if self.exported.lines else []
+        for tap in self.exported.histories:
+            size = self.exported.ring_sizes[self.exported.ring_of(tap)]
+            ends.append((f"m->whole[{tap.number}]", str(size - BEYOND)))
+        for ring, size in enumerate(self.exported.ring_sizes):
+            ends.append((f"m->past_newest[{ring}]", str(size - 1)))
         tests = [f"{member} >= 0 && {member} <= {end}" for member, end in ends]
         return _body([f"return {' && '.join(tests) or 'true'};"])
 

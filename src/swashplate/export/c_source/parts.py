@@ -36,7 +36,7 @@ from swashplate.machine.code_generation import (
 from swashplate.machine.fields import defaults_of
 from swashplate.machine.graph import LEAVES, MATH_FUNCTIONS, Node, names_in, ordered
 from swashplate.machine.language import Parsed
-from swashplate.machine.marching import PartCode
+from swashplate.machine.marching import PartCode, TapOf
 from swashplate.machine.model import arguments_of
 
 LIBRARY = {*MATH_FUNCTIONS} - {"sqrt", "floor"}
@@ -52,8 +52,8 @@ class PartInC:
     ----------
     constants : dict of Node to str
         What follows from parameters, givens, options and step alone, with its name.
-    windows : list of str
-        Names of what the part looks through, for each of its taps.
+    windows : dict of TapOf to str
+        Names of what the part looks through, for each tap that has a window.
     names : dict of str to str
         Names of its functions by their purposes.
     """
@@ -76,10 +76,13 @@ class PartInC:
         self._trace(self.trace())
         self._trace(self.trace(outlined=formulas(self.part.trace)))
         used_names = {*OWN}
-        self.windows = [
-            fresh_name(c_name(tap.input if tap.tap.width else f"{tap.input}_window"), used_names)
+        self.windows = {
+            tap: fresh_name(
+                c_name(tap.input if tap.tap.width else f"{tap.input}_window"), used_names
+            )
             for tap in self.part.taps
-        ]
+            if tap in layout.exported.windows
+        }
         self.names = {
             word: layout.loops.fresh(f"{self.member}_{word}")
             for word in ("constants", "sample", "rest", "settled")
@@ -214,17 +217,19 @@ class PartInC:
         inputs: Mapping[Node, tuple[str, str]],
         last: Node | None = None,
         pointers: Mapping[str, str] = MappingProxyType({}),
+        pasts: Mapping[Node, str] = MappingProxyType({}),
     ) -> list[str]:
         """Lines that compute results and put them in their places, as ``next->`` and the path.
 
         `inputs` are values that get their names ahead, each with its name and its text. The `last`
-        of all is returned. `pointers` are further declarations, or others, by name.
+        of all is returned. `pointers` are further declarations, or others, by name. `pasts` are the
+        places of what signals with a past were, by what they are.
         """
-        used_names = {*self.layout.loops.used_names, *OWN, *self.windows}
+        used_names = {*self.layout.loops.used_names, *OWN, *self.windows.values()}
         names = {node: fresh_name(name, used_names) for node, (name, _) in inputs.items()}
         nodes = [node for results_of_word in results.values() for _, node in results_of_word]
         nodes += [last] if last is not None else []
-        language = C(self.layout.loops, trace.origins, used_names)
+        language = C(self.layout.loops, trace.origins, used_names, pasts)
         labels = self.labels(trace, nodes)
         block = CodeBlock(
             nodes, labels, used_names, available={**available, **names}, language=language
@@ -259,15 +264,14 @@ class PartInC:
         model = layout.exported.model
         c_texts: dict[Node, str] = {}
         named: dict[Node, tuple[str, str]] = {}
-        before_record = {
-            tap.input: f"m->before_record[{layout.exported.line_of(tap)}]" for tap in self.part.taps
-        }
-        for tap, window in zip(self.part.taps, self.windows, strict=True):
+        before_record = {tap.input: self._before_record(tap) for tap in self.part.taps}
+        for tap in self.part.taps:
             for age, name in enumerate(self.part.tap_samples(tap)):
                 c_texts[graph.name(name)] = (
-                    before_record[tap.input] if start else f"{window}->s[{age}]"
+                    before_record[tap.input] if start else self._sample_of(tap, age)
                 )
-            c_texts[graph.name(self.part.delay_fraction(tap))] = "0.0" if start else f"{window}->f"
+            fraction = "0.0" if start or tap not in self.windows else f"{self.windows[tap]}->f"
+            c_texts[graph.name(self.part.delay_fraction(tap))] = fraction
         for name in self.part_model.input_types:
             node = self.part.inputs[name]
             signal = self.part_model.tap(name).signal
@@ -289,6 +293,35 @@ class PartInC:
             named[node] = c_name(name), text
         return c_texts, named
 
+    def _before_record(self, tap: TapOf) -> str:
+        """What a signal was before the first sample."""
+        exported = self.layout.exported
+        if tap.tap.passed_on:
+            return f"m->before.{exported.registers[tap.between]}"
+        if tap.tap.longest:
+            return f"m->past_before[{exported.ring_of(tap)}]"
+        return f"m->before_record[{exported.line_of(tap)}]"
+
+    def _sample_of(self, tap: TapOf, age: int) -> str:
+        """A sample of what a tap looks at, the newest of age 0."""
+        exported = self.layout.exported
+        if tap.tap.passed_on:
+            return f"m->before.{exported.registers[tap.between]}"
+        if tap.tap.longest:
+            return f"past_sample(m, {exported.ring_of(tap)}, m->whole[{tap.number}])"
+        return f"{self.windows[tap]}->s[{age}]"
+
+    @property
+    def pasts(self) -> dict[Node, str]:
+        """Tap and ring of each signal with a past, by what it is now."""
+        return {
+            graph.name(self.part.tap_samples(tap)[0]): (
+                f"m, {tap.number}, {self.layout.exported.ring_of(tap)}"
+            )
+            for tap in self.part.taps
+            if tap.tap.longest
+        }
+
     def _looked(self, value: Node, c_texts: Mapping[Node, str]) -> str:
         """What a tap makes of its window, as one expression."""
         block = CodeBlock(
@@ -302,10 +335,10 @@ class PartInC:
     def sample(self) -> str:
         """One sample: signals, limits, the next state, and whether the equations hold."""
         c_texts, named = self.inputs()
-        margin, windows = self.part.margin, self.windows
+        margin, windows = self.part.margin, [*self.windows.values()]
         holds = None if margin is None else graph.make(">", margin, graph.ZERO)
         available = {**self.places(), **c_texts}
-        lines = self.body(self.part.trace, self.results, available, named, holds)
+        lines = self.body(self.part.trace, self.results, available, named, holds, pasts=self.pasts)
         text = without_comments("\n".join(lines))
         unused = [name for name in ("next", *windows) if not mentions(text, name)]
         tag = self.layout.tags[self.number]["state"]

@@ -230,6 +230,9 @@ def _inner(outer: Runner, callee: Callee, leading: Sequence[Value], rest: Sequen
     for index, (name, value) in enumerate(zip(names, [*leading, *rest], strict=True)):
         values[name] = formal(value, name, always=index < len(leading))
     result = trace.run(callee, values)
+    if any(node.op == "past" for node in graph.ordered([node for _, node in leaves(result)])):
+        what = f"past in {source.name}, which is done again and again"
+        raise RefusedError(what, "read the past before, and pass on what it was")
     used = names_in(node for _, node in leaves(result))
     count = sum(1 for value in leading for _ in leaves(value))
     first, others = list(stands_for)[:count], list(stands_for)[count:]

@@ -10,6 +10,7 @@ import math
 import re
 from collections.abc import Iterable, Mapping, Sequence
 from importlib.resources import files
+from types import MappingProxyType
 from typing import Any
 
 from swashplate.machine import graph
@@ -219,12 +220,20 @@ class C:
         The equation that a value comes from: comments say where one begins.
     used_names : set of str
         Names of the block that is printed.
+    pasts : mapping of Node to str, optional
+        First arguments of ``past_value`` for each signal whose past is kept; that of others has
+        always been what it is.
     """
 
     def __init__(
-        self, functions: Loops, origins: Mapping[Node, Parsed], used_names: set[str]
+        self,
+        functions: Loops,
+        origins: Mapping[Node, Parsed],
+        used_names: set[str],
+        pasts: Mapping[Node, str] = MappingProxyType({}),
     ) -> None:
         self._functions, self._origins, self._used_names = functions, origins, used_names
+        self._pasts = pasts
         self._sources: dict[Parsed, int] = {}
 
     # -- expressions -------------------------------------------------------------------------------
@@ -239,6 +248,11 @@ class C:
         op, level = node.op, LEVELS.get(node.op, ATOM)
         if op == "if":
             return self._choice(node, operands)
+        if op == "past":
+            signal, age = node.args
+            if signal not in self._pasts:
+                return operands[0]
+            return f"past_value({self._pasts[signal]}, {as_double(age, operands[1])[0]})", ATOM
         if op == "element":
             (place, _), *elements = (
                 as_double(*pair) for pair in zip(node.args, operands, strict=True)

@@ -30,6 +30,8 @@ from .record import even_rate as even_rate
 from .record import least_substeps as least_substeps
 from .record import on_grid as on_grid
 from .record import record_of as record_of
+from .run import MOST_PASSES as MOST_PASSES
+from .run import SETTLED as SETTLED
 from .run import InitialStates as InitialStates
 from .run import PartNumbers as PartNumbers
 from .run import Start as Start

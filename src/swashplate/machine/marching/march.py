@@ -105,9 +105,7 @@ class March:
             for node, place, _ in self._carried()
         }
         self._passed = {
-            tap: code.variable(self._at_first(tap))
-            for tap in sample_code.late
-            if tap.tap.late == 1 and tap.tap.hold == "none" and not tap.tap.delay
+            tap: code.variable(self._at_first(tap)) for tap in sample_code.late if tap.tap.passed_on
         }
         """What one sample passes on to the next, of signals that come a sample late."""
         self._worst = code.variable(code.constant(float("inf")))

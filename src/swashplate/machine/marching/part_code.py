@@ -59,7 +59,7 @@ class TapOf(NamedTuple):
     number: int
     tap: Tap
     between: int = -1
-    """Number of its signal among those between parts that taps read, -1 for one from outside."""
+    """Number of its line among those of signals between parts, -1 for a signal from outside."""
 
 
 @lru_cache(maxsize=256)
@@ -73,7 +73,9 @@ def taps_of(model: Model, signals: tuple[str, ...]) -> tuple[TapOf, ...]:
             if name not in part.taps:
                 continue
             if model.link_of(index, name) is not None:
-                taps.append(TapOf(index, name, len(taps), tap, between.index(tap.signal)))
+                taps.append(
+                    TapOf(index, name, len(taps), tap, between.index(model.line(index, name)))
+                )
             elif tap.signal in signals:
                 taps.append(TapOf(index, name, len(taps), tap))
     return tuple(taps)
@@ -81,9 +83,9 @@ def taps_of(model: Model, signals: tuple[str, ...]) -> tuple[TapOf, ...]:
 
 @lru_cache(maxsize=256)
 def signals_between(model: Model) -> tuple[str, ...]:
-    """Signals between parts of which taps read past samples: a march keeps them as it goes."""
+    """Lines of signals between parts of which taps read past samples: a march fills them."""
     linked = [
-        part.tap(name).signal
+        model.line(index, name)
         for index, part in enumerate(model.parts)
         for name in part.input_types
         if name in part.taps and model.link_of(index, name) is not None

@@ -351,9 +351,12 @@ class Machine:
         if kind == "given":
             return float(value_at(numbers.given, stored.path))
         if kind in ("tap", "input"):
-            part = self.model.parts[stored.part]
             name, _, _ = stored.path.partition(".")
-            return signals_before.get(part.tap(name).signal, 0.0)
+            names = (
+                self.model.line(stored.part, name),
+                self.model.parts[stored.part].tap(name).signal,
+            )
+            return next((signals_before[each] for each in names if each in signals_before), 0.0)
         return h if kind == "h" else 0.0
 
     def check_inputs(self, signals: Collection[str]) -> None:
@@ -472,14 +475,15 @@ class Machine:
                 link = self.model.link_of(index, name)
                 if link is not None and tap.late:
                     value = late[index, name]
-                    between[tap.signal] = value
+                    between[self.model.line(index, name)] = value
                 elif link is not None:
                     value = 0.0
                     if start == "steady" or name in needed:
                         value = linked(link, states, arguments_of_parts, self.model.replacements)
                     if name in part.taps:
                         rest = float(value_at(numbers.p, tap.before)) if tap.before else 0.0
-                        value = between[tap.signal] = value if start == "steady" else rest
+                        value = value if start == "steady" else rest
+                        between[self.model.line(index, name)] = value
                 elif tap.signal in first:
                     value = (signals_before if name in part.taps else first)[tap.signal]
                 else:
