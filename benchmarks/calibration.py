@@ -58,7 +58,7 @@ from records import (
 )
 from scipy.stats import binom
 from second_machine import draws, logger
-from statements import in_new_maneuvers
+from statements import bands_in_new_maneuvers, in_new_maneuvers
 
 from swashplate import Drive
 from swashplate.identification.estimation.fit_problem import LIKE_NAMED, whole_drive
@@ -109,6 +109,7 @@ def campaign(program, item, folder, oracle=False):
     record |= fit(program, truth, folder, *words)
     if not cylinder:
         record["statements"] = in_new_maneuvers(folder, equipment, record)
+        record["bands"] = bands_in_new_maneuvers(folder, equipment)
         record["own_hysteresis"] = 0.5 * max(
             condition.hysteresis for condition in equipment.conditions.values()
         )
@@ -264,6 +265,20 @@ def statement_row(group, records):
     )
 
 
+def band_row(group, records):
+    """By maneuver how many bands are as wide as the error, how much wider, and what is in them."""
+    cells = []
+    for name in new_names():
+        rows = [
+            row for record in records for row in record.get("bands", ()) if row["maneuver"] == name
+        ]
+        wide = sum(row["band"] >= row["true"] for row in rows)
+        ratio = number([row["band"] / row["true"] for row in rows])
+        inside = number([100.0 * row["inside"] for row in rows])
+        cells.append(f"{wide} of {len(rows)}, {ratio}, {inside} %" if rows else "-")
+    return *group.cells, *cells
+
+
 def alarm_row(group, records):
     """Sound campaigns of which the verdict names a cause, or blames a run."""
     named = [record for record in records if record["causes"]]
@@ -309,6 +324,9 @@ def print_report(records):
     print("\nStated errors that hold, and stated over true in the median.")
     head = (*GROUP, *new_names(), "all that tests are as fast as", "a faster sine", "below half")
     print_table(head, [statement_row(*item) for item in split.items()])
+    print("\nBands about new maneuvers that are as wide as the error, both RMS; half width over")
+    print("error, and share of samples inside, in the median.")
+    print_table((*GROUP, *new_names()), [band_row(*item) for item in split.items()])
     print("\nSound campaigns with a cause, and with blamed runs (seeds).")
     head = (*GROUP, "campaigns", "with a cause", "that is not there", "which", "blamed runs")
     print_table(head, [alarm_row(*item) for item in split.items()])

@@ -1,4 +1,8 @@
-"""What a verdict states of the speed's error, beside the true one in new maneuvers."""
+"""What a fit states of the speed's error, beside the true one in new maneuvers.
+
+A verdict states errors of classes of motion, each as fast as the tests; the band about a simulation
+states that of one maneuver, whatever it is.
+"""
 
 from types import SimpleNamespace
 
@@ -7,6 +11,8 @@ from command_line import new_names
 from second_machine import logger
 
 from swashplate import Drive
+from swashplate.errors import InputError
+from swashplate.identification import Identification
 from swashplate.identification.diagnostics import discrepancy
 
 FEWEST = 50
@@ -43,15 +49,46 @@ def in_new_maneuvers(folder, equipment, record):
     drive = Drive.from_toml(folder / "fitted" / "drive.toml")
     logs = sorted((folder / "logs").iterdir())
     volts = [np.loadtxt(path, delimiter=",", skiprows=1, usecols=1) for path in logs]
-    largest = float(np.abs(np.concatenate(volts)).max())
-    conditions, names, rows = list(equipment.conditions.values()), new_names(), []
-    for index, name in enumerate(names):
-        place = round((index + 0.5) / len(names) * (len(conditions) - 1))
-        run = logger.new_run(equipment.parameters, equipment.axis, name, conditions[place])
+    largest, rows = float(np.abs(np.concatenate(volts)).max()), []
+    for name, run in new_runs(equipment):
         errors = stated_and_true(prediction, drive, run, largest)
         apart = [part.error for part in prediction.beyond if name == FASTER and "Hz" in part.motion]
         faster = 100.0 * apart[0] if apart else None
         rows += [{"maneuver": name, **each, "faster": faster} for each in errors]
+    return rows
+
+
+def new_runs(equipment):
+    """Each new maneuver's name and run, (n, 3) as of `logger.new_run`, over the machine's day."""
+    conditions, names = list(equipment.conditions.values()), new_names()
+    for index, name in enumerate(names):
+        place = round((index + 0.5) / len(names) * (len(conditions) - 1))
+        yield name, logger.new_run(equipment.parameters, equipment.axis, name, conditions[place])
+
+
+def bands_in_new_maneuvers(folder, equipment):
+    """The band about the speed in new maneuvers under conditions of the machine's day.
+
+    Returns
+    -------
+    list of dict
+        "maneuver", "true" (RMS error) and "band" (RMS of the band's half width) in % of the range
+        of the tests, and "inside", the share of samples in the band. Empty if no run moved.
+    """
+    fit, rows = Identification.load(folder / "fitted"), []
+    for name, run in new_runs(equipment):
+        _, command, speed = run.T
+        try:
+            band = fit.band(command, logger.NEW_RATE)
+        except InputError:
+            return []
+        error, full = band.speed - speed, 0.01 * band.reach
+        rows.append({
+            "maneuver": name,
+            "true": float(np.sqrt(np.mean(error**2))) / full,
+            "band": float(np.sqrt(np.mean(band.half_width**2))) / full,
+            "inside": float(np.mean(np.abs(error) <= band.half_width)),
+        })  # fmt: skip
     return rows
 
 

@@ -70,6 +70,11 @@ def test_calibration_goes_from_logs_to_tables_and_goes_on(tmp_path: Path) -> Non
     assert rows["V_dz_plus"]["told"]
     assert not rows["Z14"]["told"]
     assert {each["maneuver"] for each in record["statements"]} == set(record["new"])
+    bands = {each["maneuver"]: each for each in record["bands"]}
+    assert set(bands) == set(record["new"])
+    # the chirp is faster than any test: its band is wider than that of the stair
+    assert bands["chirp"]["band"] > bands["stair"]["band"]
+    assert all(each["true"] < each["band"] and each["inside"] > 0.9 for each in bands.values())
     assert run() == first
     assert len((tmp_path / "found.jsonl").read_text("utf-8").splitlines()) == 1
 
@@ -122,6 +127,18 @@ def test_how_narrow_an_interval_of_a_prior_is(calibration: ModuleType, tmp_path:
     (tmp_path / "setup.toml").write_text(text)
     assert prior_spreads(tmp_path / "setup.toml") == {"J": 0.3}
     assert prior_spreads(tmp_path / "none.toml") == {}
+
+
+def test_bands_are_counted_by_maneuver(calibration: ModuleType) -> None:
+    bands = [
+        [{"maneuver": "chirp", "true": 0.2, "band": 0.5, "inside": 1.0}],
+        [{"maneuver": "chirp", "true": 0.4, "band": 0.2, "inside": 0.5}],
+        [],
+    ]
+    records = [campaign_record(n, True, 0.2, bands=some) for n, some in enumerate(bands)]
+    ((group, some),) = calibration.groups(records).items()
+    cells = calibration.band_row(group, some)[len(calibration.GROUP) :]
+    assert cells == ("-", "-", "-", "-", "1 of 2, 1.5, 75 %")
 
 
 def test_statements_are_those_of_maneuvers(calibration: ModuleType) -> None:
