@@ -11,7 +11,11 @@ ASKED = {
         "draws from a fit are those of a drive: identification knows models of its own",
     ),
     "cli": (4, "a file of one's own holds a Machine, a Drive or a Model: the door"),
-    "crane": (3, "an axis takes a Drive, or the name, file or fit of one"),
+    "crane": (
+        5,
+        "an axis takes a Drive, or the name, file or fit of one; a Drive feels a load by its "
+        "parameters, a machine of one's own by its input",
+    ),
     "drive": (1, "what is equal to a drive is one"),
     "export": (4, "the door, and a drive's value references, which never change"),
     "full_order": (1, "what is equal to such a drive is one"),
