@@ -12,7 +12,7 @@ from swashplate.crane.stages.seeing import Stateless, stateless
 from swashplate.machine import Machine, Model, equation, late
 
 
-class Carried(NamedTuple):
+class TorquesBefore(NamedTuple):
     """Torques before the first sample."""
 
     first: Shafts
@@ -43,7 +43,7 @@ def torques_taken(inputs: RopeTorques) -> LoadTorques:
 
 carried = Model(
     "carried",
-    parameters=Carried,
+    parameters=TorquesBefore,
     state=Stateless,
     step=stateless,
     sample=torques_taken,
@@ -62,5 +62,5 @@ def carried_load(numbers: Body) -> Machine:
     weight = numbers.mass * GRAVITY
     pull = Vector(0.0, 0.0, -weight)
     return Machine(
-        carried, Carried(shaft_torques(pull, home.slew, boom_at(0.0, g, home), weight, g))
+        carried, TorquesBefore(shaft_torques(pull, home.slew, boom_at(0.0, g, home), weight, g))
     )
