@@ -211,11 +211,11 @@ def outputs_of(fmu: Path) -> list[str]:
     return [each.attrib["name"] for each in variables if each.attrib["causality"] == "output"]
 
 
-def rows_of(run: object, outputs: Sequence[str], count: int) -> Rows:
+def rows_of(run: Mapping[str, Sequence[float]], outputs: Sequence[str], count: int) -> Rows:
     """Outputs of a run after each step but the last: those of the sample behind it."""
     import numpy as np
 
-    table = np.array([run[name] for name in outputs])  # type: ignore[index]
+    table = np.array([run[name] for name in outputs])
     return [table[:, n].tolist() for n in range(1, count)]
 
 
@@ -242,17 +242,20 @@ def compared(python: str, importer: str, what: str, fmi: str) -> str:
             last = (done.stderr.strip() or done.stdout.strip()).splitlines()[-1:]
             return f"{importer}, {what}, FMI {fmi}: not run: {' '.join(last)}"
         given = json.loads((folder / "given.json").read_text("utf-8"))
-    differ = dict[str, float]()
-    for found, right in zip(given["rows"], wanted, strict=False):
-        for name, one, other in zip(task.outputs, found, right, strict=True):
-            differ[name] = max(differ.get(name, 0.0), abs(one - other))
-    unequal = [name for name, size in differ.items() if size != 0.0]
-    shown = [name for name in unequal if name in SHOWN] or unequal
-    found = ", ".join(f"{name} within {differ[name]:.3g}" for name in shown)
-    equal = f"{len(differ) - len(unequal)} of {len(differ)} outputs of equal bits"
+    differences = dict.fromkeys(task.outputs, 0.0)
+    # a step more than there are samples behind one
+    for row, right in zip(given["rows"][: len(wanted)], wanted, strict=True):
+        for name, one, other in zip(task.outputs, row, right, strict=True):
+            difference = abs(one - other)
+            if not difference <= differences[name]:  # also one that is no number
+                differences[name] = difference
+    unequal = [name for name, size in differences.items() if size != 0.0]
+    listed = [name for name in unequal if name in SHOWN] or unequal
+    sizes = ", ".join(f"{name} within {differences[name]:.3g}" for name in listed)
+    equal = f"{len(differences) - len(unequal)} of {len(differences)} outputs of equal bits"
     return (
         f"{importer} {given['version']}, {what}, FMI {fmi}: {len(wanted)} samples, {equal}"
-        f"{': ' if found else ''}{found}"
+        f"{': ' if sizes else ''}{sizes}"
     )
 
 
